@@ -1,0 +1,16 @@
+//! Canonical machining commands, as RS274/NGC names them, and the source spans that travel with them.
+//!
+//! This is the border between language and motion: `gcode` produces these commands and knows no machine;
+//! `planner` consumes them and knows no parser. Nothing here allocates (feature `alloc`: [`diagnostic`]).
+#![no_std]
+
+#[cfg(feature = "alloc")]
+extern crate alloc;
+
+mod command;
+#[cfg(feature = "alloc")]
+pub mod diagnostic;
+mod span;
+
+pub use command::*;
+pub use span::{FileId, Span};

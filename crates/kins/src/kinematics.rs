@@ -1,0 +1,207 @@
+//! The face every mechanism shows: LinuxCNC's `kinematicsInverse` and `kinematicsForward`, with typed errors.
+//!
+//! A branch (working or assembly mode) is part of the mechanism's parameters; nothing switches it silently.
+//! Joint travel is not part of a mechanism: it is checked with [`JointRange`], because a machine file states it.
+
+use crate::pose::{AxisSet, Pose};
+use core::fmt;
+
+/// The most joints a machine may have here (LinuxCNC's modules for these machines need at most seven).
+pub const MAX_JOINTS: usize = 9;
+
+/// Joint positions in joint order (mm or rad); entries past the machine's joint count are 0.
+pub type Joints = [f64; MAX_JOINTS];
+
+/// ∂joint/∂pose: one row per joint, nine columns in letter order; angular columns per radian.
+pub type Jacobian = [[f64; 9]; MAX_JOINTS];
+
+/// Whether a joint's coordinate is a length or an angle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointKind {
+    /// mm
+    Linear,
+    /// rad
+    Rotary,
+}
+
+/// Which end of a range was passed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Side {
+    Low,
+    High,
+}
+
+/// Joint positions with their first and second derivative along a path (or in time).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JointMotion {
+    /// q: mm or rad
+    pub position: Joints,
+    /// dq/ds, or q̇ in mm/s, rad/s
+    pub velocity: Joints,
+    /// d²q/ds², or q̈
+    pub acceleration: Joints,
+}
+
+/// How near a pose is to each kind of singularity. Both measures are dimensionless, 1 at best, 0 at a singularity
+/// (Lambda's σ may exceed 1).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Singularity {
+    /// Type 1 (inverse): the smallest μ over the joints, the cosine between link and guide.
+    pub inverse: f64,
+    /// The joint with the smallest μ, counted from 0.
+    pub inverse_joint: usize,
+    /// Type 2 (forward): ν, the sine between the links; |σ| for Lambda. The smaller of both for two mechanisms.
+    pub forward: f64,
+}
+
+/// Travel of one joint (mm or rad), both ends included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs)]
+pub struct JointRange {
+    pub min: f64,
+    pub max: f64,
+}
+
+/// A joint outside its travel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointLimit {
+    /// Counted from 0.
+    pub joint: usize,
+    /// Which end.
+    pub side: Side,
+    /// Where the joint would have to be (mm or rad).
+    pub value: f64,
+    /// The end of its travel (mm or rad).
+    pub limit: f64,
+}
+
+impl JointRange {
+    /// Slack for rounding, from the specification (mm, rad).
+    pub const TOLERANCE: f64 = 1e-9;
+
+    /// Checks the joints against their travel and names the first one outside.
+    pub fn check(ranges: &[JointRange], joints: &Joints) -> Result<(), JointLimit> {
+        for (joint, (range, &value)) in ranges.iter().zip(joints).enumerate() {
+            if !(value >= range.min - Self::TOLERANCE) {
+                return Err(JointLimit { joint, side: Side::Low, value, limit: range.min });
+            }
+            if !(value <= range.max + Self::TOLERANCE) {
+                return Err(JointLimit { joint, side: Side::High, value, limit: range.max });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What every mechanism can do. Implementations never panic, allocate, loop without bound or return NaN.
+pub trait Kinematics {
+    /// Number of joints, at most [`MAX_JOINTS`].
+    fn joint_count(&self) -> usize;
+
+    /// The coordinates the machine has.
+    fn axes(&self) -> AxisSet;
+
+    /// Length or angle.
+    fn joint_kind(&self, joint: usize) -> JointKind;
+
+    /// How the specification's error codes name a joint's travel: prefix and name, so that the code is
+    /// `{prefix}limit_low:{name}`, e.g. `("", "1")`, `("m2:", "1")`, `("", "AB")`.
+    fn joint_code(&self, joint: usize) -> (&'static str, &'static str);
+
+    /// Pose → joints, in the configured working mode.
+    ///
+    /// # Errors
+    /// See [`InverseError`]; joint travel is not checked here.
+    fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError>;
+
+    /// Joints → pose, in the configured assembly mode. `seed` is a pose nearby; closed forms ignore it.
+    ///
+    /// # Errors
+    /// See [`ForwardError`]; joint travel is not checked here.
+    fn forward(&self, joints: &Joints, seed: &Pose) -> Result<Pose, ForwardError>;
+
+    /// ∂joints/∂pose at `pose`.
+    ///
+    /// # Errors
+    /// As [`Self::inverse`], and `Singular` where the derivative does not exist.
+    fn jacobian(&self, pose: &Pose) -> Result<Jacobian, InverseError>;
+
+    /// Joint positions, velocities and accelerations for a pose moving with `velocity` and `acceleration`
+    /// (per second, or per unit of any path parameter).
+    ///
+    /// # Errors
+    /// As [`Self::jacobian`].
+    fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError>;
+
+    /// Distance from singularities at a reachable pose.
+    ///
+    /// # Errors
+    /// As [`Self::inverse`].
+    fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError>;
+}
+
+/// Why a pose has no joints. Chains, legs and joints are counted from 0 here and from 1 in [`fmt::Display`] and codes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum InverseError {
+    /// A coordinate is NaN or infinite.
+    NotFinite,
+    /// The link of this chain is too short to reach the platform: `deficit_mm` are missing.
+    OutOfReach {
+        /// For two mechanisms: which one, counted from 0; `None` where there is one.
+        mechanism: Option<u8>,
+        /// Chain (equals the joint within the mechanism).
+        chain: u8,
+        /// How much longer the link would have to be, mm.
+        deficit_mm: f64,
+    },
+    /// The inverse lies in the other assembly mode: forward would give another point.
+    WrongAssembly {
+        /// For two mechanisms: which one.
+        mechanism: Option<u8>,
+    },
+    /// A derivative was asked for where it does not exist.
+    Singular {
+        /// The measure of [`Singularity`] that is too small.
+        measure: f64,
+    },
+}
+
+/// Why joint positions have no pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum ForwardError {
+    /// A joint is NaN or infinite.
+    NotFinite,
+    /// The joints' circles do not meet.
+    NoIntersection {
+        /// For two mechanisms: which one.
+        mechanism: Option<u8>,
+        /// `too_far`, `too_close` or `coincident`.
+        reason: NoIntersection,
+    },
+    /// The pose belongs to the other working mode of this chain.
+    WrongWorkingMode {
+        /// For two mechanisms: which one.
+        mechanism: Option<u8>,
+        /// Chain.
+        chain: u8,
+    },
+}
+
+/// How two circles fail to meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum NoIntersection {
+    TooFar,
+    TooClose,
+    Coincident,
+}
+
+impl InverseError {
+    /// The code of the kinematics specification, e.g. `unreachable:1`, `m2:assembly`.
+    pub fn code(&self) -> impl fmt::Display + use<> {
+        "todo"
+    }
+}
