@@ -1,7 +1,7 @@
 //! The canonical commands. Lengths and angles are in *program* units (the last `UseLengthUnits`; degrees) and in
 //! *program* coordinates: the consumer applies tool length, G5x and G92 offsets and rotation, as LinuxCNC's canon layer does.
 
-use crate::Span;
+use crate::{Span, Text};
 
 /// Nine coordinates X Y Z A B C U V W in program units (mm or inch; degrees).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -87,7 +87,58 @@ pub enum Direction {
     Counterclockwise,
 }
 
-/// One canonical machining command. Text borrows from the interpreter's line and lives until the next block.
+/// What a probing move waits for (G38.2 to G38.5).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Probe {
+    /// Moves away from contact (G38.4, G38.5) instead of towards it.
+    pub away: bool,
+    /// No trip at the end of the move is an error (G38.2, G38.4).
+    pub must_trip: bool,
+}
+
+/// One control point of a spline in the plane, program units.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[allow(missing_docs)]
+pub struct ControlPoint {
+    /// Along the plane's first axis (X in G17).
+    pub first: f64,
+    /// Along the plane's second axis (Y in G17).
+    pub second: f64,
+    /// Weight, greater than 0.
+    pub weight: f64,
+}
+
+/// One row of the tool table, in machine units and degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Tool {
+    /// Tool number, T.
+    pub number: i32,
+    /// Pocket, P.
+    pub pocket: i32,
+    /// Length offsets X to W.
+    pub offset: Position,
+    /// Diameter, D.
+    pub diameter: f64,
+    /// Lathe front angle, I.
+    pub front_angle: f64,
+    /// Lathe back angle, J.
+    pub back_angle: f64,
+    /// Lathe orientation, Q: 0 to 9.
+    pub orientation: i32,
+}
+
+/// What M66 waits for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum InputWait {
+    Immediate,
+    Rise,
+    Fall,
+    High,
+    Low,
+}
+
+/// One canonical machining command. Text and points borrow from the interpreter and live until the next block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Canon<'a> {
@@ -107,6 +158,40 @@ pub enum Canon<'a> {
         /// Turns: sign = direction (positive counter-clockwise), magnitude = full turns, rounded up.
         turns: i32,
     },
+    /// `NURBS_FEED`: a spline at feed in the active plane (G5, G5.1, G5.2); the first point is the present position.
+    NurbsFeed {
+        /// Control points, the start point included.
+        points: &'a [ControlPoint],
+        /// Order of the spline: degree + 1.
+        order: u32,
+    },
+    /// `STRAIGHT_PROBE`: straight line at feed until the probe answers (G38.2 to G38.5).
+    StraightProbe {
+        /// End point if nothing is met.
+        end: Position,
+        /// Direction and strictness.
+        probe: Probe,
+    },
+    /// `RIGID_TAP`: to the end point and back, in step with the spindle (G33.1).
+    RigidTap {
+        /// Bottom of the hole.
+        end: Position,
+        /// Speed factor of the way back, at least 1.
+        retract_scale: f64,
+    },
+    /// `TURN_PROBE_ON` / `TURN_PROBE_OFF`.
+    TurnProbe(bool),
+    /// `START_SPEED_FEED_SYNC`: the following feed moves keep step with the spindle.
+    StartSpeedFeedSync {
+        /// Spindle number.
+        spindle: i32,
+        /// Travel per turn, program units.
+        feed_per_turn: f64,
+        /// 1 = velocity mode, 0 = position mode.
+        velocity_mode: i32,
+    },
+    /// `STOP_SPEED_FEED_SYNCH`.
+    StopSpeedFeedSync,
     /// `DWELL`, seconds.
     Dwell(f64),
     /// `SET_FEED_RATE`, program units per minute (or per turn).
@@ -126,6 +211,13 @@ pub enum Canon<'a> {
     SetMotionControlMode(MotionControlMode),
     /// `SET_NAIVECAM_TOLERANCE` (G64 Q), program units.
     SetNaivecamTolerance(f64),
+    /// `SET_PLANNER_MODE` (G64 R, LinuxCNC 2.10): 0 trapezoidal, 1 S-curve with that corner aggressiveness.
+    SetPlannerMode {
+        /// 0 or 1.
+        kind: i32,
+        /// 0.1 to 1.
+        peak_scale: f64,
+    },
     /// `SET_G5X_OFFSET`: coordinate system 1 to 9 and its offset.
     SetG5xOffset {
         /// 1 = G54 ... 9 = G59.3.
@@ -145,7 +237,7 @@ pub enum Canon<'a> {
     SetSpindleMode {
         /// Spindle number.
         spindle: i32,
-        /// rpm limit, 0 in G97.
+        /// rpm limit, 0 in G97, 1e30 = none.
         css_limit: f64,
     },
     /// `SET_SPINDLE_SPEED`.
@@ -167,8 +259,49 @@ pub enum Canon<'a> {
         /// Spindle number.
         spindle: i32,
     },
-    /// `SELECT_TOOL`.
+    /// `ORIENT_SPINDLE` (M19).
+    OrientSpindle {
+        /// Spindle number.
+        spindle: i32,
+        /// Angle, degrees.
+        angle: f64,
+        /// 0 shortest way, 1 clockwise, 2 counter-clockwise (in G87: 2 and 3).
+        mode: i32,
+    },
+    /// `SPINDLE.n.WAIT_ORIENT_COMPLETE` (M19 Q).
+    WaitOrientComplete {
+        /// Spindle number.
+        spindle: i32,
+        /// Longest wait, seconds.
+        timeout: f64,
+    },
+    /// `SELECT_TOOL` (T): tool number, 0 = none.
     SelectTool(i32),
+    /// `START_CHANGE` (M6, LinuxCNC 2.9).
+    StartChange,
+    /// `CHANGE_TOOL` (M6): the selected tool goes into the spindle.
+    ChangeTool {
+        /// Row of the tool table, from 1; 0 = none.
+        slot: i32,
+        /// Tool number.
+        tool: i32,
+    },
+    /// `CHANGE_TOOL_NUMBER` (M61): that tool is in the spindle already.
+    ChangeToolNumber {
+        /// Row of the tool table, from 1; 0 = none.
+        slot: i32,
+        /// Tool number.
+        tool: i32,
+    },
+    /// `RELOAD_TOOLDATA` (G10 L0).
+    ReloadTooldata,
+    /// `SET_TOOL_TABLE_ENTRY` (G10 L1, L10, L11).
+    SetToolTableEntry {
+        /// Row of the tool table, from 1; 0 = the spindle.
+        slot: i32,
+        /// The new row.
+        tool: &'a Tool,
+    },
     /// `MIST_ON` / `MIST_OFF`.
     Mist(bool),
     /// `FLOOD_ON` / `FLOOD_OFF`.
@@ -182,10 +315,72 @@ pub enum Canon<'a> {
         /// On or off.
         on: bool,
     },
+    /// `ENABLE_ADAPTIVE_FEED` / `DISABLE_ADAPTIVE_FEED` (M52).
+    AdaptiveFeed(bool),
+    /// `ENABLE_FEED_HOLD` / `DISABLE_FEED_HOLD` (M53).
+    FeedHold(bool),
+    /// `SET_MOTION_OUTPUT_BIT` / `CLEAR_MOTION_OUTPUT_BIT` (M62, M63): with the next motion.
+    MotionOutputBit {
+        /// Output number.
+        index: i32,
+        /// On or off.
+        on: bool,
+    },
+    /// `SET_AUX_OUTPUT_BIT` / `CLEAR_AUX_OUTPUT_BIT` (M64, M65): at once.
+    AuxOutputBit {
+        /// Output number.
+        index: i32,
+        /// On or off.
+        on: bool,
+    },
+    /// `SET_MOTION_OUTPUT_VALUE` (M67): with the next motion.
+    MotionOutputValue {
+        /// Output number.
+        index: i32,
+        /// Value.
+        value: f64,
+    },
+    /// `SET_AUX_OUTPUT_VALUE` (M68): at once.
+    AuxOutputValue {
+        /// Output number.
+        index: i32,
+        /// Value.
+        value: f64,
+    },
+    /// `WAIT` for an input (M66); not printed by `rs274`.
+    WaitInput {
+        /// Input number.
+        index: i32,
+        /// Analog (E) instead of digital (P).
+        analog: bool,
+        /// What to wait for.
+        wait: InputWait,
+        /// Longest wait, seconds.
+        timeout: f64,
+    },
+    /// `USER_M`: M100 to M199 with P and Q.
+    UserM {
+        /// 100 to 199.
+        number: i32,
+        /// P word, or -1.
+        p: f64,
+        /// Q word, or -1.
+        q: f64,
+    },
     /// `COMMENT`.
-    Comment(&'a str),
+    Comment(Text<'a>),
     /// `MESSAGE`.
-    Message(&'a str),
+    Message(Text<'a>),
+    /// A `(print,...)` comment: one line for standard output.
+    Print(Text<'a>),
+    /// `LOG`.
+    Log(Text<'a>),
+    /// `LOGOPEN`.
+    LogOpen(Text<'a>),
+    /// `LOGAPPEND`.
+    LogAppend(Text<'a>),
+    /// `LOGCLOSE`.
+    LogClose,
     /// `PROGRAM_STOP` (M0).
     ProgramStop,
     /// `OPTIONAL_PROGRAM_STOP` (M1).
@@ -202,6 +397,22 @@ pub enum Canon<'a> {
 
 /// Takes canonical commands in program order.
 pub trait CanonSink {
-    /// One command, with the stretch of source text that caused it and that block's `N` number, if any.
+    /// One command, with the stretch of source text that caused it.
     fn command(&mut self, command: &Canon<'_>, span: Span);
+
+    /// A source line was read, before it is interpreted. `text` has no line end; `span` covers it.
+    /// Only sinks that show source text (the N column of the text format) need it.
+    fn line_read(&mut self, text: &[u8], span: Span) {
+        let _ = (text, span);
+    }
+}
+
+impl<S: CanonSink + ?Sized> CanonSink for &mut S {
+    fn command(&mut self, command: &Canon<'_>, span: Span) {
+        (**self).command(command, span);
+    }
+
+    fn line_read(&mut self, text: &[u8], span: Span) {
+        (**self).line_read(text, span);
+    }
 }

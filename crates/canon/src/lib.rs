@@ -6,11 +6,17 @@
 
 #[cfg(feature = "alloc")]
 extern crate alloc;
+#[cfg(feature = "std")]
+extern crate std;
 
 mod command;
+mod decimal;
 #[cfg(feature = "alloc")]
 pub mod diagnostic;
 mod span;
+pub mod text;
+mod text_bytes;
 
 pub use command::*;
 pub use span::{FileId, Span};
+pub use text_bytes::Text;
