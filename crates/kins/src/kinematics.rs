@@ -6,6 +6,8 @@
 use crate::pose::{AxisSet, Pose};
 use core::fmt;
 
+pub use crate::errors::{ForwardError, GeometryError, InverseError, NoIntersection};
+
 /// The most joints a machine may have here (LinuxCNC's modules for these machines need at most seven).
 pub const MAX_JOINTS: usize = 9;
 
@@ -94,6 +96,66 @@ impl JointRange {
     }
 }
 
+/// The code of a joint outside its travel, e.g. `limit_low:2`, `m2:limit_high:1`, `slider_min:4`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LimitCode {
+    prefix: &'static str,
+    word: &'static str,
+    name: &'static str,
+}
+
+impl LimitCode {
+    /// `{prefix}{word}:{name}`.
+    pub const fn new(prefix: &'static str, word: &'static str, name: &'static str) -> Self {
+        Self { prefix, word, name }
+    }
+}
+
+impl fmt::Display for LimitCode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}:{}", self.prefix, self.word, self.name)
+    }
+}
+
+/// All solutions of one query, at most [`Branches::CAPACITY`]: a list without allocation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Branches<T> {
+    items: [T; 16],
+    count: usize,
+}
+
+impl<T: Copy + Default + PartialEq> Branches<T> {
+    /// The most solutions kept: MOMA-W has 2⁴ working modes.
+    pub const CAPACITY: usize = 16;
+
+    /// No solution.
+    pub fn new() -> Self {
+        Self { items: [T::default(); 16], count: 0 }
+    }
+
+    /// Adds a solution, unless it is there already (two branches meet at a singularity) or the list is full.
+    pub fn push(&mut self, item: T) {
+        if self.as_slice().contains(&item) {
+            return;
+        }
+        if let Some(place) = self.items.get_mut(self.count) {
+            *place = item;
+            self.count += 1;
+        }
+    }
+
+    /// The solutions.
+    pub fn as_slice(&self) -> &[T] {
+        self.items.get(..self.count).unwrap_or(&[])
+    }
+}
+
+impl<T: Copy + Default + PartialEq> Default for Branches<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 /// What every mechanism can do. Implementations never panic, allocate, loop without bound or return NaN.
 pub trait Kinematics {
     /// Number of joints, at most [`MAX_JOINTS`].
@@ -108,6 +170,17 @@ pub trait Kinematics {
     /// How the specification's error codes name a joint's travel: prefix and name, so that the code is
     /// `{prefix}limit_low:{name}`, e.g. `("", "1")`, `("m2:", "1")`, `("", "AB")`.
     fn joint_code(&self, joint: usize) -> (&'static str, &'static str);
+
+    /// The code of a joint outside its travel: what a message should show. `limit_low:1` by default;
+    /// Lambda writes `slider_min:1`.
+    fn limit_code(&self, limit: &JointLimit) -> LimitCode {
+        let (prefix, name) = self.joint_code(limit.joint);
+        let word = match limit.side {
+            Side::Low => "limit_low",
+            Side::High => "limit_high",
+        };
+        LimitCode::new(prefix, word, name)
+    }
 
     /// Pose → joints, in the configured working mode.
     ///
@@ -139,69 +212,24 @@ pub trait Kinematics {
     /// # Errors
     /// As [`Self::inverse`].
     fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError>;
-}
 
-/// Why a pose has no joints. Chains, legs and joints are counted from 0 here and from 1 in [`fmt::Display`] and codes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum InverseError {
-    /// A coordinate is NaN or infinite.
-    NotFinite,
-    /// The link of this chain is too short to reach the platform: `deficit_mm` are missing.
-    OutOfReach {
-        /// For two mechanisms: which one, counted from 0; `None` where there is one.
-        mechanism: Option<u8>,
-        /// Chain (equals the joint within the mechanism).
-        chain: u8,
-        /// How much longer the link would have to be, mm.
-        deficit_mm: f64,
-    },
-    /// The inverse lies in the other assembly mode: forward would give another point.
-    WrongAssembly {
-        /// For two mechanisms: which one.
-        mechanism: Option<u8>,
-    },
-    /// A derivative was asked for where it does not exist.
-    Singular {
-        /// The measure of [`Singularity`] that is too small.
-        measure: f64,
-    },
-}
+    /// The joints of every working mode, the configured one first where it exists.
+    ///
+    /// # Errors
+    /// As [`Self::inverse`], if no working mode reaches the pose.
+    fn inverse_branches(&self, pose: &Pose) -> Result<Branches<Joints>, InverseError> {
+        let mut all = Branches::new();
+        all.push(self.inverse(pose)?);
+        Ok(all)
+    }
 
-/// Why joint positions have no pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum ForwardError {
-    /// A joint is NaN or infinite.
-    NotFinite,
-    /// The joints' circles do not meet.
-    NoIntersection {
-        /// For two mechanisms: which one.
-        mechanism: Option<u8>,
-        /// `too_far`, `too_close` or `coincident`.
-        reason: NoIntersection,
-    },
-    /// The pose belongs to the other working mode of this chain.
-    WrongWorkingMode {
-        /// For two mechanisms: which one.
-        mechanism: Option<u8>,
-        /// Chain.
-        chain: u8,
-    },
-}
-
-/// How two circles fail to meet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[allow(missing_docs)]
-pub enum NoIntersection {
-    TooFar,
-    TooClose,
-    Coincident,
-}
-
-impl InverseError {
-    /// The code of the kinematics specification, e.g. `unreachable:1`, `m2:assembly`.
-    pub fn code(&self) -> impl fmt::Display + use<> {
-        "todo"
+    /// The pose of every assembly mode, the configured one first where it exists.
+    ///
+    /// # Errors
+    /// As [`Self::forward`], if no assembly exists.
+    fn forward_branches(&self, joints: &Joints, seed: &Pose) -> Result<Branches<Pose>, ForwardError> {
+        let mut all = Branches::new();
+        all.push(self.forward(joints, seed)?);
+        Ok(all)
     }
 }

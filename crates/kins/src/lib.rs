@@ -3,13 +3,29 @@
 //! `no_std`, no allocation, no panic, no time and no files. One file per mechanism, the same order in each:
 //! header → parameters as written → validated type → inverse → forward → Jacobian → tests.
 #![no_std]
+// `!(x >= y)` is how NaN ends on the side of the error.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
 
+pub mod cartesian;
+pub mod errors;
 pub mod kinematics;
+pub mod machine;
 pub mod maths;
+pub mod moma;
+pub mod moma_4s;
+pub mod moma_w;
+pub mod planar;
 pub mod pose;
 
+pub use cartesian::Cartesian;
+pub use errors::{ForwardError, GeometryError, InverseError, Key, NoIntersection};
 pub use kinematics::{
-    ForwardError, InverseError, Jacobian, JointKind, JointLimit, JointMotion, JointRange, Joints, Kinematics,
+    Branches, Jacobian, JointKind, JointLimit, JointMotion, JointRange, Joints, Kinematics, LimitCode,
     MAX_JOINTS, Side, Singularity,
 };
+pub use machine::Mechanism;
+pub use moma::{Moma, MomaConfiguration, MomaParameters};
+pub use moma_4s::{Moma4s, Moma4sConfiguration, Moma4sParameters};
+pub use moma_w::{MomaW, MomaWParameters};
+pub use planar::{Planar, PlanarParameters, PlanarState, Vec2};
 pub use pose::{Axis, AxisSet, Pose};

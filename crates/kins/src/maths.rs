@@ -1,8 +1,11 @@
 //! The one door to `libm`: every transcendental function of the workspace comes from here, so that every
-//! platform gives the same bits (std's `sin` differs from libm's in 3 % of arguments).
+//! platform gives the same bits (std's `sin` differs from libm's in 3 % of arguments). `libm`'s feature `arch` lets
+//! `sqrt`, `floor`, `ceil` and `round` use the processor's instruction: these are exactly rounded everywhere.
 
 pub use core::f64::consts::{PI, TAU};
-pub use libm::{acos, asin, atan, atan2, ceil, cos, exp, floor, hypot, log, pow, round, sin, sqrt, tan};
+pub use libm::{
+    acos, asin, atan, atan2, ceil, cos, exp, fabs, floor, hypot, log, pow, round, sin, sincos, sqrt, tan,
+};
 
 /// Radians of an angle in degrees.
 pub fn radians(degrees: f64) -> f64 {

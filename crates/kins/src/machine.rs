@@ -1,0 +1,98 @@
+//! One type over all mechanisms, for code that must not be generic (planner queue, HAL, command line).
+
+use crate::cartesian::Cartesian;
+use crate::errors::{ForwardError, InverseError};
+use crate::kinematics::{
+    Branches, Jacobian, JointKind, JointLimit, JointMotion, Joints, Kinematics, LimitCode, Singularity,
+};
+use crate::moma::Moma;
+use crate::moma_4s::Moma4s;
+use crate::moma_w::MomaW;
+use crate::planar::Planar;
+use crate::pose::{AxisSet, Pose};
+
+/// Joint numbers in codes, from 1.
+pub(crate) fn number(joint: usize) -> &'static str {
+    ["1", "2", "3", "4", "5", "6", "7", "8", "9"].get(joint).copied().unwrap_or("?")
+}
+
+macro_rules! mechanisms {
+    ($($(#[$doc:meta])* $name:ident($kind:ty)),+ $(,)?) => {
+        /// Any mechanism of this crate.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        #[non_exhaustive]
+        #[allow(clippy::large_enum_variant)] // no heap: the largest one sets the size
+        pub enum Mechanism {
+            $($(#[$doc])* $name($kind)),+
+        }
+
+        $(impl From<$kind> for Mechanism {
+            fn from(mechanism: $kind) -> Self {
+                Self::$name(mechanism)
+            }
+        })+
+
+        impl Kinematics for Mechanism {
+            fn joint_count(&self) -> usize {
+                match self { $(Self::$name(m) => m.joint_count()),+ }
+            }
+            fn axes(&self) -> AxisSet {
+                match self { $(Self::$name(m) => Kinematics::axes(m)),+ }
+            }
+            fn joint_kind(&self, joint: usize) -> JointKind {
+                match self { $(Self::$name(m) => m.joint_kind(joint)),+ }
+            }
+            fn joint_code(&self, joint: usize) -> (&'static str, &'static str) {
+                match self { $(Self::$name(m) => m.joint_code(joint)),+ }
+            }
+            fn limit_code(&self, limit: &JointLimit) -> LimitCode {
+                match self { $(Self::$name(m) => m.limit_code(limit)),+ }
+            }
+            fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
+                match self { $(Self::$name(m) => Kinematics::inverse(m, pose)),+ }
+            }
+            fn forward(&self, joints: &Joints, seed: &Pose) -> Result<Pose, ForwardError> {
+                match self { $(Self::$name(m) => Kinematics::forward(m, joints, seed)),+ }
+            }
+            fn jacobian(&self, pose: &Pose) -> Result<Jacobian, InverseError> {
+                match self { $(Self::$name(m) => Kinematics::jacobian(m, pose)),+ }
+            }
+            fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
+                match self { $(Self::$name(m) => Kinematics::motion(m, pose, velocity, acceleration)),+ }
+            }
+            fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
+                match self { $(Self::$name(m) => Kinematics::singularity(m, pose)),+ }
+            }
+            fn inverse_branches(&self, pose: &Pose) -> Result<Branches<Joints>, InverseError> {
+                match self { $(Self::$name(m) => Kinematics::inverse_branches(m, pose)),+ }
+            }
+            fn forward_branches(&self, joints: &Joints, seed: &Pose) -> Result<Branches<Pose>, ForwardError> {
+                match self { $(Self::$name(m) => Kinematics::forward_branches(m, joints, seed)),+ }
+            }
+        }
+    };
+}
+
+mechanisms! {
+    /// Joint = coordinate.
+    Cartesian(Cartesian),
+    /// Two P-R-R chains, any parameters.
+    Planar(Planar),
+    /// Two sliders, two links, one hinge.
+    Moma(Moma),
+    /// Platform on two pairs of links.
+    Moma4s(Moma4s),
+    /// Hot wire between two MOMA 4S.
+    MomaW(MomaW),
+}
+
+impl Mechanism {
+    /// The same mechanism without limits of its own that are not geometry (wire length and tilt, ...):
+    /// what `--no-limits` asks.
+    pub fn without_limits(self) -> Self {
+        match self {
+            Self::MomaW(m) => Self::MomaW(m.without_limits()),
+            other => other,
+        }
+    }
+}

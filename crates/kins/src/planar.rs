@@ -1,0 +1,586 @@
+//! The planar core: two P-R-R chains carry a platform that does not turn.
+//!
+//! MOMA and MOMA 4S are parameter sets of it; MOMA-W and the HV-Mill are built from those.
+//!
+//! Source: [MOMA] G. Vasilić, S. Živanović, Tehnika 71(1), 2016, 57–63, doi 10.5937/tehnika1601057V;
+//! [HV] G. Vasilić, S. Živanović, M. Milutinović, Z. Dimić, "Kinematika kompleksne višeosne i viševretene mašine
+//! alatke namenjene za proces obrade glodanjem". Several printed equations err; each correction is named where it stands.
+//! Frame: fixed, right-handed, mm. Joint i = travel of slider i along its guide from its reference point.
+//!
+//! | here               | [MOMA]    | meaning                                              |
+//! |--------------------|-----------|------------------------------------------------------|
+//! | `direction`        | aᵢ        | unit vector of guide i                               |
+//! | `reference_mm`     | Rᵢ        | place of the slider joint at pᵢ = 0                  |
+//! | `offset_mm`        | –         | platform joint minus controlled point T (0 for MOMA) |
+//! | `l_mm`             | lᵢ        | length of link i                                     |
+//! | `working_mode`     | ± in (7)  | σᵢ, sign of the root of the inverse                  |
+//! | `assembly`         | ± in (10) | s, side of T seen from the line of centres           |
+//!
+//! With the *virtual centre* Cᵢ = Rᵢ − oᵢ + pᵢ aᵢ, T is an intersection of two circles about C₁ and C₂.
+//!
+//! Inverse: closed form, [MOMA] (4), (7)–(9) with the root's sign as a parameter (the printed minus is wrong for
+//!   configurations c and d) and without the cancelling difference B² − C.
+//! Forward: intersection of two circles. [MOMA] (10)–(12) and [HV] (8), (9) divide by the difference of the centres' x,
+//!   which vanishes at regular poses (sliders above each other); the circle form does not, so we depart from them.
+//! Singular: link i at a right angle to guide i (type 1, wᵢ = 0); links parallel (type 2, X = 0).
+//! Accuracy: forward(inverse(T)) within 1e-9 mm away from singularities; at wᵢ = 0 the square root leaves
+//!   about l·√ε ≈ 3e-6 mm. Budget in `tests/budget.rs`.
+//! Not modelled: collisions, the thickness of bodies (but see `one_sided`), elasticity.
+
+use crate::errors::{self, ForwardError, GeometryError, InverseError, Key, NoIntersection};
+use crate::kinematics::{
+    Branches, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity,
+};
+use crate::maths::{cos_sin_deg, fabs, sqrt};
+use crate::pose::{Axis, AxisSet, Pose};
+
+/// A point or vector in the plane, mm.
+pub type Vec2 = [f64; 2];
+
+/// Velocity functions answer `Singular` where μᵢ or ν is below this.
+pub const SINGULAR_GUARD: f64 = 1e-9;
+
+/// Slack at the edge of reach, relative to l² or l₁ + l₂.
+const EDGE: f64 = 1e-12;
+
+/// The planar mechanism as written in a machine file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+pub struct PlanarParameters {
+    /// Rᵢ: place of slider joint i at pᵢ = 0, mm.
+    pub reference_mm: [Vec2; 2],
+    /// αᵢ: direction of guide i, degrees from x.
+    pub guide_angle_deg: [f64; 2],
+    /// lᵢ: length of link i, mm.
+    pub l_mm: [f64; 2],
+    /// oᵢ: platform joint minus controlled point, mm.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub offset_mm: [Vec2; 2],
+    /// σᵢ = ±1: sign of the root of the inverse.
+    pub working_mode: [i8; 2],
+    /// s = ±1: the sign of cross(C₂ − C₁, T − C₁).
+    pub assembly: i8,
+    /// Links may lie only on the inner side of their guides ([MOMA] figs 6b, 6d).
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub one_sided: bool,
+}
+
+/// One chain, ready to run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Chain {
+    /// Virtual centre at p = 0: R − o.
+    origin: Vec2,
+    /// a
+    direction: Vec2,
+    /// l
+    link: f64,
+    /// σ
+    mode: f64,
+    /// m: the inner side of the guide.
+    inward: f64,
+}
+
+/// A valid planar mechanism.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Planar {
+    chains: [Chain; 2],
+    assembly: f64,
+    one_sided: bool,
+}
+
+/// The solved inverse: everything the derivatives need.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanarState {
+    /// p₁, p₂, mm.
+    pub joints: [f64; 2],
+    /// L₁, L₂: from virtual centre to T, mm.
+    pub links: [Vec2; 2],
+    /// wᵢ = aᵢ·Lᵢ, mm.
+    pub along: [f64; 2],
+}
+
+#[inline]
+fn cross(u: Vec2, v: Vec2) -> f64 {
+    u[0] * v[1] - u[1] * v[0]
+}
+
+#[inline]
+fn dot(u: Vec2, v: Vec2) -> f64 {
+    u[0] * v[0] + u[1] * v[1]
+}
+
+#[inline]
+fn sub(u: Vec2, v: Vec2) -> Vec2 {
+    [u[0] - v[0], u[1] - v[1]]
+}
+
+/// u + k v
+#[inline]
+fn along(u: Vec2, k: f64, v: Vec2) -> Vec2 {
+    [u[0] + k * v[0], u[1] + k * v[1]]
+}
+
+/// Not below zero; NaN becomes 0 as well.
+#[inline]
+fn clamp(x: f64) -> f64 {
+    if x > 0.0 { x } else { 0.0 }
+}
+
+impl Chain {
+    /// p and L; `None` beyond the edge of reach (also for NaN).
+    #[inline]
+    fn solve(&self, t: Vec2, mode: f64) -> Option<(f64, Vec2, f64)> {
+        let a = self.direction;
+        let k = sub(t, self.origin);
+        let b = dot(a, k);
+        let n = cross(a, k);
+        let d = (self.link - fabs(n)) * (self.link + fabs(n));
+        if !(d >= -EDGE * self.link * self.link) {
+            return None;
+        }
+        let root = mode * sqrt(clamp(d));
+        // L = k − p a = N perp(a) − σ√d a
+        Some((b + root, [-n * a[1] - root * a[0], n * a[0] - root * a[1]], -root))
+    }
+
+    #[inline]
+    fn distance(&self, t: Vec2) -> f64 {
+        cross(self.direction, sub(t, self.origin))
+    }
+}
+
+impl Planar {
+    /// A mechanism from its parameters.
+    ///
+    /// # Errors
+    /// `NotFinite`, `OutOfRange` (lengths beyond ±1e6 mm), `NotPositive` and `NotASign` name the parameter;
+    /// `CoincidentRails` if both sliders run on one line in the same mode with equal links (or are one slider).
+    pub fn new(p: &PlanarParameters) -> Result<Self, GeometryError> {
+        let chain = |i: usize,
+                     reference: Vec2,
+                     angle: f64,
+                     link: f64,
+                     offset: Vec2,
+                     mode: i8|
+         -> Result<Chain, GeometryError> {
+            let key = Key::at("reference_mm", i);
+            let reference = [errors::coordinate(key, reference[0])?, errors::coordinate(key, reference[1])?];
+            let key = Key::at("offset_mm", i);
+            let offset = [errors::coordinate(key, offset[0])?, errors::coordinate(key, offset[1])?];
+            let (c, s) = cos_sin_deg(errors::angle_deg(Key::at("guide_angle_deg", i), angle)?);
+            Ok(Chain {
+                origin: sub(reference, offset),
+                direction: [c, s],
+                link: errors::length(Key::at("l_mm", i), link)?,
+                mode: errors::sign(Key::at("working_mode", i), mode)?,
+                inward: 0.0,
+            })
+        };
+        let [r1, r2] = p.reference_mm;
+        let [a1, a2] = p.guide_angle_deg;
+        let [l1, l2] = p.l_mm;
+        let [o1, o2] = p.offset_mm;
+        let [m1, m2] = p.working_mode;
+        let mut first = chain(0, r1, a1, l1, o1, m1)?;
+        let mut second = chain(1, r2, a2, l2, o2, m2)?;
+        let assembly = errors::sign(Key::of("assembly"), p.assembly)?;
+
+        // One rail: same line, both sliders on the same side of the platform.
+        let between = sub(second.origin, first.origin);
+        let facing = dot(first.direction, second.direction);
+        let one_line = fabs(cross(first.direction, second.direction)) < 1e-9
+            && fabs(cross(first.direction, between)) < 1e-6;
+        let same_side = first.mode * second.mode * facing > 0.0;
+        let one_place = fabs(between[0]) < 1e-6 && fabs(between[1]) < 1e-6 && facing > 0.0;
+        if one_line && same_side && (one_place || fabs(l1 - l2) < 1e-6) {
+            return Err(GeometryError::CoincidentRails);
+        }
+
+        // mᵢ = sign (nᵢ · (Rⱼ − Rᵢ)), from the true reference points.
+        let inward = |c: &Chain, from: Vec2, to: Vec2| {
+            let side = cross(c.direction, sub(to, from));
+            if side > 0.0 {
+                1.0
+            } else if side < 0.0 {
+                -1.0
+            } else {
+                0.0
+            }
+        };
+        first.inward = inward(&first, r1, r2);
+        second.inward = inward(&second, r2, r1);
+        Ok(Self { chains: [first, second], assembly, one_sided: p.one_sided })
+    }
+
+    /// The links' lengths, mm.
+    pub fn links_mm(&self) -> [f64; 2] {
+        [self.chains[0].link, self.chains[1].link]
+    }
+
+    /// T (mm) → p₁, p₂ (mm).
+    ///
+    /// # Errors
+    /// `NotFinite`; `OutOfReach` if T + oᵢ is farther than lᵢ from guide line i; `WrongAssembly`; `GuideSide` if
+    /// the guides are one-sided. Travel is not checked.
+    #[inline]
+    pub fn inverse(&self, t: Vec2) -> Result<[f64; 2], InverseError> {
+        Ok(self.solve(t)?.joints)
+    }
+
+    /// The inverse with the links' vectors, for derivatives.
+    ///
+    /// # Errors
+    /// As [`Self::inverse`].
+    #[inline]
+    pub fn solve(&self, t: Vec2) -> Result<PlanarState, InverseError> {
+        let [c1, c2] = &self.chains;
+        let (Some((p1, l1, w1)), Some((p2, l2, w2))) = (c1.solve(t, c1.mode), c2.solve(t, c2.mode)) else {
+            return Err(self.out_of_reach(t));
+        };
+        // cross(C₂ − C₁, T − C₁) = cross(L₁ − L₂, L₁) = cross(L₁, L₂)
+        if !(self.assembly * cross(l1, l2) >= -1e-9 * c1.link * c2.link) {
+            return Err(InverseError::WrongAssembly { mechanism: None });
+        }
+        if self.one_sided {
+            self.guide_side(t).map_err(|(chain, excess_mm)| InverseError::GuideSide {
+                mechanism: None,
+                chain,
+                excess_mm,
+            })?;
+        }
+        Ok(PlanarState { joints: [p1, p2], links: [l1, l2], along: [w1, w2] })
+    }
+
+    #[cold]
+    fn out_of_reach(&self, t: Vec2) -> InverseError {
+        if !(t[0].is_finite() && t[1].is_finite()) {
+            return InverseError::NotFinite;
+        }
+        let [c1, c2] = &self.chains;
+        let (chain, c) = if c1.solve(t, 1.0).is_none() { (0, c1) } else { (1, c2) };
+        let deficit = fabs(c.distance(t)) - c.link;
+        // Far beyond 1e154 mm the distance itself overflows.
+        InverseError::OutOfReach { mechanism: None, chain, deficit_mm: deficit.min(f64::MAX) }
+    }
+
+    /// One-sided guides: mᵢ Nᵢ ≥ 0; otherwise the chain and the excess (mm).
+    fn guide_side(&self, t: Vec2) -> Result<(), (u8, f64)> {
+        for (c, number) in self.chains.iter().zip(0u8..) {
+            let side = c.inward * c.distance(t);
+            if side < -1e-9 {
+                return Err((number, -side));
+            }
+        }
+        Ok(())
+    }
+
+    /// p₁, p₂ (mm) → T (mm), in the configured assembly mode.
+    ///
+    /// # Errors
+    /// `NotFinite`; `NoIntersection`; `WrongWorkingMode` if the pose found has the other root in the inverse;
+    /// `GuideSide` if the guides are one-sided. Travel is not checked.
+    pub fn forward(&self, p: [f64; 2]) -> Result<Vec2, ForwardError> {
+        let (t, links) = self.intersect(p, self.assembly)?;
+        for ((c, l), chain) in self.chains.iter().zip(links).zip(0u8..) {
+            if !(c.mode * dot(c.direction, l) <= 1e-9 * c.link) {
+                return Err(ForwardError::WrongWorkingMode { mechanism: None, chain });
+            }
+        }
+        if self.one_sided {
+            self.guide_side(t).map_err(|(chain, excess_mm)| ForwardError::GuideSide {
+                mechanism: None,
+                chain,
+                excess_mm,
+            })?;
+        }
+        Ok(t)
+    }
+
+    /// The circles' intersection on one side of the line of centres, and the two link vectors.
+    fn intersect(&self, p: [f64; 2], side: f64) -> Result<(Vec2, [Vec2; 2]), ForwardError> {
+        if !(p[0].is_finite() && p[1].is_finite()) {
+            return Err(ForwardError::NotFinite);
+        }
+        let none = |reason| Err(ForwardError::NoIntersection { mechanism: None, reason });
+        let [a, b] = &self.chains;
+        let (l1, l2) = (a.link, b.link);
+        let c1 = along(a.origin, p[0], a.direction);
+        let c2 = along(b.origin, p[1], b.direction);
+        let span = sub(c2, c1);
+        let far = l1 + l2;
+        // A distance beyond 1e150 would overflow when squared.
+        if fabs(span[0]) > 1e9 || fabs(span[1]) > 1e9 {
+            return none(NoIntersection::TooFar);
+        }
+        let d = sqrt(dot(span, span));
+        if !(d > EDGE * far) {
+            return none(NoIntersection::Coincident);
+        }
+        let (stretched, fold1, fold2) = (far - d, d + l1 - l2, d - l1 + l2);
+        if stretched < -EDGE * far {
+            return none(NoIntersection::TooFar);
+        }
+        if fold1 < -EDGE * far || fold2 < -EDGE * far {
+            return none(NoIntersection::TooClose);
+        }
+        let e = [span[0] / d, span[1] / d];
+        let f = 0.5 * (d + (l1 - l2) * (l1 + l2) / d);
+        let h = side * sqrt((far + d) * clamp(stretched) * clamp(fold1) * clamp(fold2)) / (2.0 * d);
+        let link1 = [f * e[0] - h * e[1], f * e[1] + h * e[0]];
+        Ok((along(c1, 1.0, link1), [link1, sub(link1, span)]))
+    }
+
+    /// K = ∂p/∂T at a solved state: rows joints, dimensionless.
+    ///
+    /// # Errors
+    /// `Singular` where a link is perpendicular to its guide (μᵢ below [`SINGULAR_GUARD`]).
+    pub fn rates(&self, state: &PlanarState) -> Result<[Vec2; 2], InverseError> {
+        self.guard(state)?;
+        let [l1, l2] = state.links;
+        let [w1, w2] = state.along;
+        Ok([[l1[0] / w1, l1[1] / w1], [l2[0] / w2, l2[1] / w2]])
+    }
+
+    /// G = ∂T/∂p at a solved state: rows x, y. [MOMA] (17)–(21) with the sign put right: ṗ = +K Ṫ, G = K⁻¹.
+    ///
+    /// # Errors
+    /// `Singular` where the links are parallel (ν below [`SINGULAR_GUARD`]).
+    pub fn forward_rates(&self, state: &PlanarState) -> Result<[Vec2; 2], InverseError> {
+        let [l1, l2] = state.links;
+        let [w1, w2] = state.along;
+        let x = cross(l1, l2);
+        let nu = fabs(x) / (self.chains[0].link * self.chains[1].link);
+        if !(nu >= SINGULAR_GUARD) {
+            return Err(InverseError::Singular { measure: nu });
+        }
+        Ok([[l2[1] * w1 / x, -l1[1] * w2 / x], [-l2[0] * w1 / x, l1[0] * w2 / x]])
+    }
+
+    #[inline]
+    fn guard(&self, state: &PlanarState) -> Result<(), InverseError> {
+        let [w1, w2] = state.along;
+        let [c1, c2] = &self.chains;
+        if fabs(w1) >= SINGULAR_GUARD * c1.link && fabs(w2) >= SINGULAR_GUARD * c2.link {
+            return Ok(());
+        }
+        Err(InverseError::Singular { measure: (fabs(w1) / c1.link).min(fabs(w2) / c2.link) })
+    }
+
+    /// Joint rates and accelerations for a T moving with `velocity` and `acceleration`:
+    /// p̈ᵢ = (Lᵢ·T̈ + |Ṫ − aᵢ ṗᵢ|²) / wᵢ.
+    ///
+    /// # Errors
+    /// As [`Self::rates`]; `NotFinite` if a rate is not finite.
+    #[inline]
+    pub fn rates_along(
+        &self,
+        state: &PlanarState,
+        velocity: Vec2,
+        acceleration: Vec2,
+    ) -> Result<([f64; 2], [f64; 2]), InverseError> {
+        self.guard(state)?;
+        let one = |c: &Chain, l: Vec2, w: f64| {
+            let rate = dot(l, velocity) / w;
+            let turn = along(velocity, -rate, c.direction);
+            (rate, (dot(l, acceleration) + dot(turn, turn)) / w)
+        };
+        let (v1, a1) = one(&self.chains[0], state.links[0], state.along[0]);
+        let (v2, a2) = one(&self.chains[1], state.links[1], state.along[1]);
+        if !(a1.is_finite() && a2.is_finite()) {
+            return Err(InverseError::NotFinite);
+        }
+        Ok(([v1, v2], [a1, a2]))
+    }
+
+    /// p, ṗ, p̈ for T moving with `velocity` and `acceleration`: the planner's call.
+    ///
+    /// # Errors
+    /// As [`Self::inverse`] and [`Self::rates_along`].
+    #[inline]
+    pub fn motion_2(
+        &self,
+        t: Vec2,
+        velocity: Vec2,
+        acceleration: Vec2,
+    ) -> Result<[[f64; 2]; 3], InverseError> {
+        let state = self.solve(t)?;
+        let (v, a) = self.rates_along(&state, velocity, acceleration)?;
+        Ok([state.joints, v, a])
+    }
+
+    /// μᵢ = |wᵢ|/lᵢ and ν = |X|/(l₁ l₂).
+    pub fn measures(&self, state: &PlanarState) -> Singularity {
+        let [c1, c2] = &self.chains;
+        let mu1 = fabs(state.along[0]) / c1.link;
+        let mu2 = fabs(state.along[1]) / c2.link;
+        let forward = fabs(cross(state.links[0], state.links[1])) / (c1.link * c2.link);
+        let (inverse, inverse_joint) = if mu2 < mu1 { (mu2, 1) } else { (mu1, 0) };
+        Singularity { inverse, inverse_joint, forward }
+    }
+
+    /// p₁, p₂ of every working mode that reaches T, the configured one first; empty out of reach.
+    pub fn inverse_all(&self, t: Vec2) -> Branches<[f64; 2]> {
+        let mut all = Branches::new();
+        let [c1, c2] = &self.chains;
+        for (m1, m2) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+            if let (Some((p1, ..)), Some((p2, ..))) = (c1.solve(t, m1 * c1.mode), c2.solve(t, m2 * c2.mode)) {
+                all.push([p1, p2]);
+            }
+        }
+        all
+    }
+
+    /// T of both assembly modes, the configured one first; empty where the circles do not meet.
+    pub fn forward_all(&self, p: [f64; 2]) -> Branches<Vec2> {
+        let mut all = Branches::new();
+        for side in [self.assembly, -self.assembly] {
+            if let Ok((t, _)) = self.intersect(p, side) {
+                all.push(t);
+            }
+        }
+        all
+    }
+}
+
+/// A mechanism's two joints as the first two of a machine.
+pub(crate) fn joints([p1, p2]: [f64; 2]) -> Joints {
+    let mut joints = [0.0; MAX_JOINTS];
+    joints[0] = p1;
+    joints[1] = p2;
+    joints
+}
+
+/// Machine axes X and Y are T; joints p1 and p2.
+impl Kinematics for Planar {
+    fn joint_count(&self) -> usize {
+        2
+    }
+
+    fn axes(&self) -> AxisSet {
+        AxisSet::new(&[Axis::X, Axis::Y])
+    }
+
+    fn joint_kind(&self, _: usize) -> JointKind {
+        JointKind::Linear
+    }
+
+    fn joint_code(&self, joint: usize) -> (&'static str, &'static str) {
+        ("", if joint == 0 { "1" } else { "2" })
+    }
+
+    #[inline]
+    fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
+        Ok(joints(Planar::inverse(self, [pose.x, pose.y])?))
+    }
+
+    fn forward(&self, p: &Joints, _: &Pose) -> Result<Pose, ForwardError> {
+        let [x, y] = Planar::forward(self, [p[0], p[1]])?;
+        Ok(Pose { x, y, ..Pose::ZERO })
+    }
+
+    fn jacobian(&self, pose: &Pose) -> Result<Jacobian, InverseError> {
+        let [k1, k2] = self.rates(&self.solve([pose.x, pose.y])?)?;
+        let mut jacobian = [[0.0; 9]; MAX_JOINTS];
+        jacobian[0][..2].copy_from_slice(&k1);
+        jacobian[1][..2].copy_from_slice(&k2);
+        Ok(jacobian)
+    }
+
+    #[inline]
+    fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
+        let [position, velocity, acceleration] =
+            self.motion_2([pose.x, pose.y], [velocity.x, velocity.y], [acceleration.x, acceleration.y])?;
+        Ok(JointMotion {
+            position: joints(position),
+            velocity: joints(velocity),
+            acceleration: joints(acceleration),
+        })
+    }
+
+    fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
+        Ok(self.measures(&self.solve([pose.x, pose.y])?))
+    }
+
+    fn inverse_branches(&self, pose: &Pose) -> Result<Branches<Joints>, InverseError> {
+        let t = [pose.x, pose.y];
+        let found = self.inverse_all(t);
+        if found.as_slice().is_empty() {
+            return Err(self.out_of_reach(t));
+        }
+        let mut all = Branches::new();
+        for &p in found.as_slice() {
+            all.push(joints(p));
+        }
+        Ok(all)
+    }
+
+    fn forward_branches(&self, p: &Joints, _: &Pose) -> Result<Branches<Pose>, ForwardError> {
+        let p = [p[0], p[1]];
+        self.intersect(p, self.assembly)?;
+        let mut all = Branches::new();
+        for &[x, y] in self.forward_all(p).as_slice() {
+            all.push(Pose { x, y, ..Pose::ZERO });
+        }
+        Ok(all)
+    }
+}
+
+/// Lets a machine that *is* a planar mechanism with other parameters answer through its core.
+macro_rules! planar_kinematics {
+    ($machine:ty) => {
+        impl $crate::Kinematics for $machine {
+            fn joint_count(&self) -> usize {
+                2
+            }
+            fn axes(&self) -> $crate::AxisSet {
+                $crate::Kinematics::axes(&self.planar)
+            }
+            fn joint_kind(&self, joint: usize) -> $crate::JointKind {
+                self.planar.joint_kind(joint)
+            }
+            fn joint_code(&self, joint: usize) -> (&'static str, &'static str) {
+                self.planar.joint_code(joint)
+            }
+            #[inline]
+            fn inverse(&self, pose: &$crate::Pose) -> Result<$crate::Joints, $crate::InverseError> {
+                $crate::Kinematics::inverse(&self.planar, pose)
+            }
+            fn forward(
+                &self,
+                joints: &$crate::Joints,
+                seed: &$crate::Pose,
+            ) -> Result<$crate::Pose, $crate::ForwardError> {
+                $crate::Kinematics::forward(&self.planar, joints, seed)
+            }
+            fn jacobian(&self, pose: &$crate::Pose) -> Result<$crate::Jacobian, $crate::InverseError> {
+                self.planar.jacobian(pose)
+            }
+            #[inline]
+            fn motion(
+                &self,
+                pose: &$crate::Pose,
+                velocity: &$crate::Pose,
+                acceleration: &$crate::Pose,
+            ) -> Result<$crate::JointMotion, $crate::InverseError> {
+                self.planar.motion(pose, velocity, acceleration)
+            }
+            fn singularity(&self, pose: &$crate::Pose) -> Result<$crate::Singularity, $crate::InverseError> {
+                self.planar.singularity(pose)
+            }
+            fn inverse_branches(
+                &self,
+                pose: &$crate::Pose,
+            ) -> Result<$crate::kinematics::Branches<$crate::Joints>, $crate::InverseError> {
+                self.planar.inverse_branches(pose)
+            }
+            fn forward_branches(
+                &self,
+                joints: &$crate::Joints,
+                seed: &$crate::Pose,
+            ) -> Result<$crate::kinematics::Branches<$crate::Pose>, $crate::ForwardError> {
+                self.planar.forward_branches(joints, seed)
+            }
+        }
+    };
+}
+pub(crate) use planar_kinematics;
