@@ -1,0 +1,294 @@
+//! What may not be exceeded, and how it looks along the path.
+//!
+//! Every joint, and every axis the machine file limits, is one *row*: with q′ and q″ its derivatives along s and
+//! x = ṡ², its speed is |q′|√x and its acceleration q′ s̈ + q″ x. Rows are stored divided by their acceleration
+//! limit, so each asks for |d₁ s̈ + d₂ x| ≤ 1. (Bobrow, Dubowsky, Gibson 1985; Pham & Pham, TOPP-RA, 2018.)
+
+use crate::path::{FeedGroup, Geometry, feed_length};
+use crate::{PlanError, PlanErrorKind};
+use pkm_canon::Span;
+use pkm_kins::{Axis, InverseError, JointRange, Joints, Kinematics, MAX_JOINTS, Pose};
+
+/// Plans are made to this share of every limit, so that what happens between two nodes (measured: 3e-4 more than at
+/// the nodes) stays within the limit itself. Costs 0.03 % of the time.
+pub const GUARD: f64 = 0.9995;
+
+/// Largest ṡ² ever planned, (mm/s)²: a path nothing limits must still have a finite speed.
+pub(crate) const FASTEST: f64 = 1e12;
+
+/// Limits of one joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointLimits {
+    /// Travel, mm or rad.
+    pub range: JointRange,
+    /// mm/s or rad/s; finite and positive.
+    pub max_velocity: f64,
+    /// mm/s² or rad/s²; finite and positive.
+    pub max_acceleration: f64,
+}
+
+/// Limits of one axis, where the machine file states them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisLimits {
+    /// Which axis.
+    pub axis: Axis,
+    /// Travel, mm or rad.
+    pub range: Option<JointRange>,
+    /// mm/s or rad/s; infinite = no limit.
+    pub max_velocity: f64,
+    /// mm/s² or rad/s²; infinite = no limit.
+    pub max_acceleration: f64,
+}
+
+/// All limits of a machine with at most `R` rows (joints + limited axes).
+#[derive(Debug, Clone)]
+pub struct Limits<const R: usize> {
+    joints: heapless::Vec<JointLimits, MAX_JOINTS>,
+    axes: heapless::Vec<AxisLimits, 9>,
+    /// A pose nearer to a singularity than this (either measure) is refused.
+    pub singularity_guard: f64,
+}
+
+/// A limit that makes no machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LimitsError {
+    /// More joints and limited axes than this planner has rows for.
+    TooMany {
+        /// Joints plus limited axes.
+        rows: usize,
+        /// What there is room for.
+        room: usize,
+    },
+    /// Joint `joint` (from 0) has a limit that is not finite and positive, or an empty range.
+    Joint(usize),
+    /// This axis has a limit that is not positive, or an empty range.
+    Axis(Axis),
+}
+
+impl<const R: usize> Limits<R> {
+    /// Checks and keeps the limits.
+    ///
+    /// # Errors
+    /// [`LimitsError`]: a joint's velocity or acceleration limit is not finite and > 0, an axis limit is not > 0, a
+    /// range is empty or NaN, or there are more rows than `R`.
+    pub fn new(joints: &[JointLimits], axes: &[AxisLimits], singularity_guard: f64) -> Result<Self, LimitsError> {
+        let rows = joints.len() + axes.len();
+        let too_many = LimitsError::TooMany { rows, room: R };
+        if rows > R {
+            return Err(too_many);
+        }
+        let good = |limit: f64| limit > 0.0 && limit.is_finite();
+        for (i, joint) in joints.iter().enumerate() {
+            if !good(joint.max_velocity) || !good(joint.max_acceleration) || !(joint.range.min < joint.range.max) {
+                return Err(LimitsError::Joint(i));
+            }
+        }
+        for limit in axes {
+            let range_ok = limit.range.is_none_or(|range| range.min < range.max);
+            if !(limit.max_velocity > 0.0) || !(limit.max_acceleration > 0.0) || !range_ok {
+                return Err(LimitsError::Axis(limit.axis));
+            }
+        }
+        Ok(Self {
+            joints: heapless::Vec::from_slice(joints).map_err(|_| too_many)?,
+            axes: heapless::Vec::from_slice(axes).map_err(|_| too_many)?,
+            singularity_guard,
+        })
+    }
+
+    /// Number of rows in use.
+    pub(crate) fn rows(&self) -> usize {
+        self.joints.len() + self.axes.len()
+    }
+
+    /// Checks a pose and its joints against travel.
+    pub(crate) fn check_travel(&self, pose: &Pose, joints: &Joints) -> Result<(), PlanErrorKind> {
+        for (joint, (limits, &value)) in self.joints.iter().zip(joints).enumerate() {
+            if !(value >= limits.range.min - JointRange::TOLERANCE && value <= limits.range.max + JointRange::TOLERANCE) {
+                return Err(PlanErrorKind::JointTravel { joint, value, range: limits.range });
+            }
+        }
+        for limits in &self.axes {
+            let value = pose.get(limits.axis);
+            if let Some(range) = limits.range
+                && !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE)
+            {
+                return Err(PlanErrorKind::AxisTravel { axis: limits.axis, value, range });
+            }
+        }
+        Ok(())
+    }
+
+    /// The strips and caps at one point of a piece.
+    ///
+    /// # Errors
+    /// The point is out of reach, out of travel or too near a singularity.
+    pub(crate) fn sample<K: Kinematics>(
+        &self,
+        kinematics: &K,
+        geometry: &Geometry,
+        s: f64,
+        feed: Feed,
+        span: Span,
+    ) -> Result<Sample<R>, PlanError> {
+        let point = geometry.at(s);
+        let pose = Pose::from_array(point.position);
+        let fail = |kind| PlanError { kind, span, pose };
+        let motion = kinematics
+            .motion(&pose, &Pose::from_array(point.first), &Pose::from_array(point.second))
+            .map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
+        self.check_travel(&pose, &motion.position).map_err(fail)?;
+        if self.singularity_guard > 0.0 {
+            let measure = kinematics.singularity(&pose).map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
+            let nearest = measure.inverse.min(measure.forward);
+            if !(nearest >= self.singularity_guard) {
+                return Err(fail(PlanErrorKind::Unreachable(InverseError::Singular { measure: nearest })));
+            }
+        }
+        let mut sample = Sample {
+            rows: Rows { first: [0.0; R], second: [0.0; R] },
+            speed: [0.0; R],
+            position: [0.0; R],
+            hard: FASTEST,
+            feed: feed.cap(&point.first),
+        };
+        let joint_rows = self.joints.iter().zip(&motion.position).zip(motion.velocity.iter().zip(&motion.acceleration));
+        let joint_rows = joint_rows.map(|((l, q), (d1, d2))| (l.max_velocity, l.max_acceleration, *q, *d1, *d2));
+        let axis_rows = self.axes.iter().map(|limits| {
+            let k = limits.axis as usize;
+            let at = |v: &[f64; 9]| v.get(k).copied().unwrap_or(0.0);
+            (limits.max_velocity, limits.max_acceleration, at(&point.position), at(&point.first), at(&point.second))
+        });
+        let slots = sample.rows.first.iter_mut().zip(&mut sample.rows.second).zip(&mut sample.speed).zip(&mut sample.position);
+        for ((((first, second), speed), position), (v_max, a_max, q, d1, d2)) in slots.zip(joint_rows.chain(axis_rows)) {
+            *first = d1 / (a_max * GUARD);
+            *second = d2 / (a_max * GUARD);
+            *speed = d1 / (v_max * GUARD);
+            *position = q;
+            sample.hard = sample.hard.min(speed_cap(*speed));
+        }
+        Ok(sample)
+    }
+}
+
+impl<const R: usize> Limits<R> {
+    /// What happens between two neighbouring nodes, `length` apart: the cap on x from a speed that peaks between them,
+    /// and a joint or axis that turns back between them checked against its travel.
+    ///
+    /// # Errors
+    /// A joint or axis leaves its travel between the nodes.
+    pub(crate) fn between(
+        &self,
+        a: &Sample<R>,
+        b: &Sample<R>,
+        length: f64,
+        piece: &crate::planner::Piece,
+        s: f64,
+    ) -> Result<f64, PlanError> {
+        let mut cap = a.hard.min(b.hard);
+        let joints = self.joints.iter().map(|l| (l.max_velocity, l.max_acceleration, Some(l.range)));
+        let axes = self.axes.iter().map(|l| (l.max_velocity, l.max_acceleration, l.range));
+        for (row, (v_max, a_max, range)) in joints.chain(axes).enumerate() {
+            let at = |v: &[f64; R]| v.get(row).copied().unwrap_or(0.0);
+            let (speed_a, speed_b) = (at(&a.speed), at(&b.speed));
+            let (bend_a, bend_b) = (at(&a.rows.second), at(&b.rows.second));
+            if bend_a * bend_b < 0.0 && a_max.is_finite() && v_max.is_finite() {
+                // q″ changes sign: q′ has an extremum, about a triangle's area away from either end.
+                let to_peak = length * bend_a.abs() / (bend_a.abs() + bend_b.abs());
+                let extra = 0.5 * bend_a.abs() * a_max / v_max * to_peak;
+                cap = cap.min(speed_cap(speed_a.abs().max(speed_b.abs()) + extra));
+            }
+            if let Some(range) = range
+                && speed_a * speed_b < 0.0
+                && v_max.is_finite()
+            {
+                let to_turn = length * speed_a.abs() / (speed_a.abs() + speed_b.abs());
+                let value = at(&a.position) + 0.5 * speed_a * v_max * GUARD * to_turn;
+                if !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE) {
+                    let kind = match self.axes.get(row.wrapping_sub(self.joints.len())) {
+                        Some(limits) => PlanErrorKind::AxisTravel { axis: limits.axis, value, range },
+                        None => PlanErrorKind::JointTravel { joint: row, value, range },
+                    };
+                    let pose = Pose::from_array(piece.geometry.at(s + to_turn).position);
+                    return Err(PlanError { kind, span: piece.span, pose });
+                }
+            }
+        }
+        Ok(cap)
+    }
+}
+
+/// Largest ṡ² with |speed| ṡ ≤ 1.
+pub(crate) fn speed_cap(speed: f64) -> f64 {
+    let square = speed * speed;
+    if square * FASTEST > 1.0 { 1.0 / square } else { FASTEST }
+}
+
+/// How fast the program wants to go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Feed {
+    /// mm/s (rad/s where only ABC move); infinite for rapids.
+    pub speed: f64,
+    /// What the speed counts.
+    pub group: FeedGroup,
+}
+
+impl Feed {
+    fn cap(&self, first: &[f64; 9]) -> f64 {
+        let length = feed_length(first, self.group);
+        if length > 0.0 { (self.speed / length) * (self.speed / length) } else { f64::INFINITY }
+    }
+}
+
+/// Strips |first·s̈ + second·x| ≤ 1.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rows<const R: usize> {
+    pub(crate) first: [f64; R],
+    pub(crate) second: [f64; R],
+}
+
+/// Everything known at one point of the path.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sample<const R: usize> {
+    pub(crate) rows: Rows<R>,
+    /// q′ over the velocity limit.
+    pub(crate) speed: [f64; R],
+    pub(crate) position: [f64; R],
+    /// Cap on x from velocity limits.
+    pub(crate) hard: f64,
+    /// Cap on x from the feed at 100 %; infinite for rapids.
+    pub(crate) feed: f64,
+}
+
+impl<const R: usize> Sample<R> {
+    /// How much the strips change between two points, in shares of the limits: the measure that spaces the nodes.
+    /// Also returns x̂ and the largest s̈ there, the scales of speed and acceleration.
+    pub(crate) fn variation(&self, other: &Self) -> Scales {
+        let mut steepest = 0.0_f64;
+        let mut bend = 0.0_f64;
+        for (a, b) in self.rows.first.iter().zip(&other.rows.first) {
+            steepest = steepest.max(a.abs()).max(b.abs());
+        }
+        for (a, b) in self.rows.second.iter().zip(&other.rows.second) {
+            bend = bend.max(a.abs()).max(b.abs());
+        }
+        let by_bend = if bend * FASTEST > 2.0 { 2.0 / bend } else { FASTEST };
+        let speed = self.hard.min(other.hard).min(self.feed).min(other.feed).min(by_bend);
+        let acceleration = if steepest > 0.0 { 1.0 / steepest } else { FASTEST };
+        let mut change = 0.0_f64;
+        let firsts = self.rows.first.iter().zip(&other.rows.first);
+        let seconds = self.rows.second.iter().zip(&other.rows.second);
+        for ((a1, b1), (a2, b2)) in firsts.zip(seconds) {
+            change = change.max((b1 - a1).abs() * acceleration + (b2 - a2).abs() * speed);
+        }
+        Scales { change, speed, acceleration }
+    }
+}
+
+/// See [`Sample::variation`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scales {
+    pub(crate) change: f64,
+    pub(crate) speed: f64,
+    pub(crate) acceleration: f64,
+}

@@ -1,0 +1,112 @@
+//! The path: pieces in all nine coordinates, each with exact first and second derivatives along its parameter s.
+//!
+//! The parameter runs from 0 to `length()`. On lines and arcs |dX/ds| of XYZ is 1 where XYZ moves; where only
+//! UVW moves it is their length, and a purely rotary move uses its angle (rad). Blends keep dX/ds continuous,
+//! so pieces may be scaled differently.
+
+mod arc;
+mod blend;
+mod line;
+
+pub use arc::Arc;
+pub use blend::{Blend, Tolerance};
+pub use line::Line;
+
+use pkm_kins::maths::sqrt;
+
+/// Nine coordinates or their derivatives, in letter order (mm, rad).
+pub type Vector = [f64; 9];
+
+/// A point of a path with its derivatives along s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// X(s): mm, rad
+    pub position: Vector,
+    /// dX/ds
+    pub first: Vector,
+    /// d²X/ds²
+    pub second: Vector,
+}
+
+/// Which coordinates the feed counts, for one move. The rule is LinuxCNC's: XYZ if they move, else UVW, else ABC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum FeedGroup {
+    Xyz,
+    Uvw,
+    Abc,
+    /// A blend between moves of different groups: all lengths together.
+    Mixed,
+}
+
+/// The shape of one piece.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs)]
+pub enum Geometry {
+    Line(Line),
+    Arc(Arc),
+    Blend(Blend),
+    /// No motion: a dwell at this place.
+    Hold(Vector),
+}
+
+impl Geometry {
+    /// Parameter length (≥ 0).
+    pub fn length(&self) -> f64 {
+        match self {
+            Geometry::Line(line) => line.length,
+            Geometry::Arc(arc) => arc.length,
+            Geometry::Blend(blend) => blend.length,
+            Geometry::Hold(_) => 0.0,
+        }
+    }
+
+    /// Position and derivatives at s.
+    pub fn at(&self, s: f64) -> Point {
+        match self {
+            Geometry::Line(line) => line.at(s),
+            Geometry::Arc(arc) => arc.at(s),
+            Geometry::Blend(blend) => blend.at(s),
+            Geometry::Hold(place) => Point { position: *place, first: [0.0; 9], second: [0.0; 9] },
+        }
+    }
+}
+
+/// Euclidean length of three of the nine coordinates, starting at `from` (0 = XYZ, 3 = ABC, 6 = UVW).
+pub(crate) fn norm3(v: &Vector, from: usize) -> f64 {
+    let square = |i: usize| v.get(from + i).map_or(0.0, |x| x * x);
+    sqrt(square(0) + square(1) + square(2))
+}
+
+/// |v| of the coordinates the feed counts.
+pub fn feed_length(v: &Vector, group: FeedGroup) -> f64 {
+    match group {
+        FeedGroup::Xyz => norm3(v, 0),
+        FeedGroup::Uvw => norm3(v, 6),
+        FeedGroup::Abc => norm3(v, 3),
+        FeedGroup::Mixed => {
+            let (xyz, uvw) = (norm3(v, 0), norm3(v, 6));
+            sqrt(xyz * xyz + uvw * uvw)
+        }
+    }
+}
+
+/// The feed group of a displacement (RS274/NGC 3.5.19 as LinuxCNC applies it).
+pub fn feed_group(displacement: &Vector) -> FeedGroup {
+    // Below a picometre a coordinate only carries rounding.
+    const STILL: f64 = 1e-9;
+    if norm3(displacement, 0) > STILL {
+        FeedGroup::Xyz
+    } else if norm3(displacement, 6) > STILL {
+        FeedGroup::Uvw
+    } else {
+        FeedGroup::Abc
+    }
+}
+
+pub(crate) fn combine(a: &Vector, b: &Vector, f: impl Fn(f64, f64) -> f64) -> Vector {
+    core::array::from_fn(|i| match (a.get(i), b.get(i)) {
+        (Some(&a), Some(&b)) => f(a, b),
+        _ => 0.0,
+    })
+}

@@ -1,0 +1,329 @@
+//! The planner's face and its queue: moves in, path pieces joined by stops, smooth seams or blends.
+//!
+//! The last move is kept open: its second half is released only when the next move is known (a blend may replace
+//! it), or when the machine would have to brake for lack of it.
+
+use crate::executor::Executor;
+use crate::grid::{Grid, Node};
+use crate::limits::{Feed, Limits};
+use crate::path::{Blend, FeedGroup, Geometry, Tolerance, Vector, combine};
+use crate::{PlanError, path};
+use heapless::Deque;
+use pkm_canon::Span;
+use pkm_kins::{Joints, Kinematics, Pose};
+
+/// How a move ends where the next one begins (G61, G61.1, G64).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PathMode {
+    /// G61.1: at rest.
+    ExactStop,
+    /// G61: on the path to 1e-9 mm; at rest only where the direction jumps.
+    ExactPath,
+    /// G64: within a tolerance of the path.
+    Blend(Tolerance),
+}
+
+/// One move in machine coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Move {
+    /// Its shape; it must start where the previous move ended.
+    pub geometry: Geometry,
+    /// Speed asked for.
+    pub feed: Feed,
+    /// G0: the rapid override applies, not the feed override.
+    pub rapid: bool,
+    /// How it ends.
+    pub mode: PathMode,
+    /// The block.
+    pub span: Span,
+}
+
+/// Settings of a planner.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Servo period, s.
+    pub servo_period_s: f64,
+}
+
+/// Why a move was not taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PushError {
+    /// No room now: tick, then push again.
+    Full,
+    /// The path cannot be run; the machine will stop before this place.
+    Plan(PlanError),
+}
+
+/// What the machine is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum State {
+    Idle,
+    Moving,
+    Dwell,
+    Held,
+}
+
+/// Where the machine has to be at the end of a servo period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setpoint {
+    /// mm, rad
+    pub pose: Pose,
+    /// mm or rad
+    pub joints: Joints,
+    /// mm/s or rad/s
+    pub joint_velocity: Joints,
+    /// Number of the move, from 0 in the order of [`Planner::push`]; a blend carries the move before it.
+    pub motion: u32,
+    /// Place in that move's own geometry (0 to its length).
+    pub s: f64,
+    /// The block.
+    pub span: Span,
+    /// Moving, held, ...
+    pub state: State,
+}
+
+/// A move, or a blend between two, cut to what is really driven: s from `from` to `to`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Piece {
+    pub(crate) geometry: Geometry,
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    pub(crate) feed: Feed,
+    pub(crate) rapid: bool,
+    /// More of it will be released later.
+    pub(crate) open: bool,
+    /// At rest at its end.
+    pub(crate) stop: bool,
+    pub(crate) dwell_ns: u64,
+    mode: PathMode,
+    pub(crate) motion: u32,
+    pub(crate) span: Span,
+}
+
+/// Plans moves on a machine with at most `R` limited joints and axes; `PIECES` and `NODES` bound the look-ahead.
+pub struct Planner<K, const R: usize, const PIECES: usize, const NODES: usize> {
+    pub(crate) kinematics: K,
+    pub(crate) limits: Limits<R>,
+    pub(crate) settings: Settings,
+    pub(crate) pieces: Deque<Piece, PIECES>,
+    /// Number of the piece at the front of `pieces`.
+    pub(crate) first_piece: u64,
+    pub(crate) nodes: Deque<Node<R>, NODES>,
+    pub(crate) grid: Grid<R>,
+    pub(crate) executor: Executor,
+    pub(crate) fault: Option<PlanError>,
+    pub(crate) setpoint: Setpoint,
+    moves: u32,
+    end: Vector,
+}
+
+impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Planner<K, R, PIECES, NODES> {
+    /// A planner with the machine at rest at `start`.
+    ///
+    /// # Errors
+    /// The start pose is out of reach or out of travel.
+    pub fn new(kinematics: K, limits: Limits<R>, settings: Settings, start: Pose) -> Result<Self, PlanError> {
+        let fail = |kind| PlanError { kind, span: Span::default(), pose: start };
+        let joints = kinematics.inverse(&start).map_err(|e| fail(crate::PlanErrorKind::Unreachable(e)))?;
+        limits.check_travel(&start, &joints).map_err(fail)?;
+        Ok(Self {
+            kinematics,
+            limits,
+            settings,
+            pieces: Deque::new(),
+            first_piece: 0,
+            nodes: Deque::new(),
+            grid: Grid::new(),
+            executor: Executor::new(),
+            fault: None,
+            setpoint: Setpoint {
+                pose: start,
+                joints,
+                joint_velocity: [0.0; pkm_kins::MAX_JOINTS],
+                motion: 0,
+                s: 0.0,
+                span: Span::default(),
+                state: State::Idle,
+            },
+            moves: 0,
+            end: start.to_array(),
+        })
+    }
+
+    /// The last setpoint.
+    pub fn setpoint(&self) -> &Setpoint {
+        &self.setpoint
+    }
+
+    /// The kinematics.
+    pub fn kinematics(&self) -> &K {
+        &self.kinematics
+    }
+
+    /// Where the queue ends: the next move must start here.
+    pub fn end(&self) -> &Vector {
+        &self.end
+    }
+
+    /// Why the queue stopped growing, if it did; the machine stops before that place.
+    pub fn fault(&self) -> Option<&PlanError> {
+        self.fault.as_ref()
+    }
+
+    /// True when a move can be pushed.
+    pub fn has_room(&self) -> bool {
+        self.pieces.len() + 2 <= PIECES
+    }
+
+    /// Appends a move. Moves of no length are taken and dropped. Returns the move's number.
+    ///
+    /// # Errors
+    /// [`PushError::Full`]: tick first. [`PushError::Plan`]: a place on the path cannot be run.
+    pub fn push(&mut self, next: Move) -> Result<u32, PushError> {
+        if let Some(fault) = self.fault {
+            return Err(PushError::Plan(fault));
+        }
+        if !self.has_room() {
+            return Err(PushError::Full);
+        }
+        let motion = self.moves;
+        self.moves = self.moves.wrapping_add(1);
+        let length = next.geometry.length();
+        if !(length > 0.0) {
+            return Ok(motion);
+        }
+        let from = self.join(&next);
+        self.end = next.geometry.at(length).position;
+        self.append(Piece {
+            geometry: next.geometry,
+            from,
+            to: (0.5 * length).max(from),
+            feed: next.feed,
+            rapid: next.rapid,
+            open: true,
+            stop: false,
+            dwell_ns: 0,
+            mode: next.mode,
+            motion,
+            span: next.span,
+        });
+        self.refill().map_err(PushError::Plan)?;
+        Ok(motion)
+    }
+
+    /// Stops at the end of the queue and waits.
+    ///
+    /// # Errors
+    /// As [`Self::push`].
+    pub fn push_dwell(&mut self, dwell_ns: u64, span: Span) -> Result<(), PushError> {
+        if !self.has_room() {
+            return Err(PushError::Full);
+        }
+        self.finish();
+        self.append(Piece {
+            geometry: Geometry::Hold(self.end),
+            from: 0.0,
+            to: 0.0,
+            feed: Feed { speed: f64::INFINITY, group: FeedGroup::Xyz },
+            rapid: false,
+            open: false,
+            stop: true,
+            dwell_ns,
+            mode: PathMode::ExactStop,
+            motion: self.moves.wrapping_sub(1),
+            span,
+        });
+        Ok(())
+    }
+
+    /// Nothing follows for now: the last move is released to its end, where the machine comes to rest.
+    pub fn finish(&mut self) {
+        if let Some(last) = self.pieces.back_mut()
+            && last.open
+        {
+            last.to = last.geometry.length();
+            last.open = false;
+            last.stop = true;
+        }
+    }
+
+    fn append(&mut self, piece: Piece) {
+        // `has_room` was checked by the caller: there is always room for a blend and a move.
+        let _ = self.pieces.push_back(piece);
+    }
+
+    /// Joins the open last piece to `next`; returns where on `next` the drive along it begins.
+    fn join(&mut self, next: &Move) -> f64 {
+        let Some(last) = self.pieces.back_mut() else { return 0.0 };
+        if !last.open {
+            last.stop = true;
+            return 0.0;
+        }
+        let length = last.geometry.length();
+        last.open = false;
+        last.to = length;
+        let (e1, e2) = (last.geometry.at(length).first, next.geometry.at(0.0).first);
+        let turn = combine(&e2, &e1, |b, a| (b - a).abs()).into_iter().fold(0.0, f64::max);
+        // A seam smoother than this jumps a joint's speed by less than rounding shows.
+        const SMOOTH: f64 = 1e-9;
+        // G61 passes gentle seams through a blend too small to see: 5e-10 mm.
+        const EXACT: Tolerance = Tolerance { length_mm: 5e-10, angle_rad: 1e-11 };
+        const GENTLE: f64 = 0.02;
+        let tolerance = match last.mode {
+            PathMode::ExactStop => None,
+            _ if turn <= SMOOTH => return 0.0,
+            PathMode::ExactPath if turn <= GENTLE => Some(EXACT),
+            PathMode::ExactPath => None,
+            PathMode::Blend(tolerance) => Some(tolerance),
+        };
+        let Some((cut, blend)) = tolerance.and_then(|t| Blend::new(&last.geometry, &next.geometry, t)) else {
+            last.stop = true;
+            return 0.0;
+        };
+        last.to = length - cut;
+        let group = if last.feed.group == next.feed.group { next.feed.group } else { FeedGroup::Mixed };
+        let blend = Piece {
+            geometry: Geometry::Blend(blend),
+            from: 0.0,
+            to: blend.length,
+            feed: Feed { speed: last.feed.speed.min(next.feed.speed), group },
+            rapid: last.rapid && next.rapid,
+            open: false,
+            stop: false,
+            ..*last
+        };
+        self.append(blend);
+        cut
+    }
+
+    pub(crate) fn piece(&self, number: u64) -> Option<&Piece> {
+        let index = number.checked_sub(self.first_piece)?;
+        self.pieces.get(usize::try_from(index).ok()?)
+    }
+
+    /// True when everything pushed has been driven and the machine is at rest.
+    pub fn is_idle(&self) -> bool {
+        let gridded = self.grid.piece + 1 >= self.first_piece + self.pieces.len() as u64;
+        let at_end = self.pieces.back().is_none_or(|last| !last.open && (gridded && self.grid.s >= last.to));
+        let dwelling = self.nodes.front().is_some_and(|node| node.dwell_ns > 0);
+        at_end && self.nodes.len() <= 1 && self.executor.at_rest() && !dwelling
+    }
+
+    /// Empties the queue; the machine must be at rest. The queue then ends where the machine is.
+    pub(crate) fn clear(&mut self) {
+        self.first_piece += self.pieces.len() as u64;
+        self.pieces.clear();
+        self.nodes.clear();
+        self.grid = Grid::new();
+        self.grid.piece = self.first_piece;
+        self.executor.rest();
+        self.fault = None;
+        self.end = self.setpoint.pose.to_array();
+    }
+
+    pub(crate) fn pose_at(&self, piece: u64, s: f64) -> Option<(path::Point, &Piece)> {
+        let piece = self.piece(piece)?;
+        Some((piece.geometry.at(s), piece))
+    }
+}

@@ -1,0 +1,241 @@
+//! The planning cases whose shortest possible durations are known (toppra 0.6.10 on the finest grid), judged on
+//! the trace alone: first and second differences of the joint positions at the servo period and at a tenth of it.
+//!
+//! `val_…`: T_ref is from an outside source. P10 to P12 need the delta and the hexapod.
+
+use pkm_kins::machine::Mechanism;
+use pkm_kins::moma::{Moma, MomaConfiguration};
+use pkm_kins::{Axis, AxisSet, JointRange, Kinematics, Pose};
+use pkm_planner::path::{FeedGroup, Geometry, Line, Tolerance, Vector};
+use pkm_planner::{Feed, JointLimits, Limits, Move, PathMode, Planner, PushError, Settings, State};
+
+const PERIOD_S: f64 = 1e-3;
+const PI: f64 = core::f64::consts::PI;
+
+type TestPlanner = Planner<Mechanism, 6, 64, 1024>;
+
+struct Case {
+    mechanism: Mechanism,
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+    moves: Vec<(Geometry, PathMode)>,
+    feed_mm_s: f64,
+}
+
+fn xyz(x: f64, y: f64, z: f64) -> Vector {
+    [x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+}
+
+fn moma() -> Mechanism {
+    Mechanism::Moma(Moma::new(&MomaConfiguration::A.into()).unwrap())
+}
+
+fn identity(axes: &[Axis]) -> Mechanism {
+    Mechanism::Cartesian(pkm_kins::cartesian::Cartesian::new(AxisSet::new(axes)).unwrap())
+}
+
+fn polyline(points: &[Vector], mode: PathMode) -> Vec<(Geometry, PathMode)> {
+    points.windows(2).filter_map(|p| Line::new(p[0], p[1])).map(|line| (Geometry::Line(line), mode)).collect()
+}
+
+fn blend(p_mm: f64) -> PathMode {
+    PathMode::Blend(Tolerance { length_mm: p_mm, angle_rad: 1e-3 })
+}
+
+fn flower(chords: u32) -> Vec<Vector> {
+    (0..=chords)
+        .map(|k| {
+            let t = 2.0 * PI * f64::from(k) / f64::from(chords);
+            xyz(
+                40.0 * libm::cos(t) + 6.0 * libm::cos(7.0 * t) - 6.0,
+                -265.0 + 32.0 * libm::sin(t) + 6.0 * libm::sin(7.0 * t),
+                0.0,
+            )
+        })
+        .collect()
+}
+
+fn zigzag() -> Vec<Vector> {
+    (0..=20).map(|k| xyz(-40.0 + 4.0 * f64::from(k), -265.0 + 4.0 * f64::from(k % 2), 0.0)).collect()
+}
+
+fn on_moma(moves: Vec<(Geometry, PathMode)>) -> Case {
+    Case { mechanism: moma(), velocity: vec![100.0; 2], acceleration: vec![1000.0; 2], moves, feed_mm_s: f64::INFINITY }
+}
+
+fn line(a: Vector, b: Vector) -> Vec<(Geometry, PathMode)> {
+    polyline(&[a, b], PathMode::ExactPath)
+}
+
+/// What happens during a run, by tick.
+#[derive(Clone, Copy, PartialEq)]
+enum Disturbance {
+    None,
+    RandomOverride,
+    HoldThirds,
+}
+
+struct Trace {
+    duration_s: f64,
+    /// Worst joint velocity and acceleration, in shares of the limit.
+    velocity: f64,
+    acceleration: f64,
+    end: Vector,
+}
+
+fn random(state: &mut u64) -> u64 {
+    *state ^= *state << 13;
+    *state ^= *state >> 7;
+    *state ^= *state << 17;
+    *state
+}
+
+fn drive(case: &Case, period_s: f64, disturbance: Disturbance, one_per_tick: bool) -> Trace {
+    let joint_limits: Vec<JointLimits> = (0..case.velocity.len())
+        .map(|i| JointLimits {
+            range: JointRange { min: -1000.0, max: 1000.0 },
+            max_velocity: case.velocity[i],
+            max_acceleration: case.acceleration[i],
+        })
+        .collect();
+    let start = Pose::from_array(case.moves[0].0.at(0.0).position);
+    let limits = Limits::new(&joint_limits, &[], 0.0).unwrap();
+    let settings = Settings { servo_period_s: period_s };
+    let mut planner = TestPlanner::new(case.mechanism, limits, settings, start).unwrap();
+    let n = case.mechanism.joint_count();
+    let mut rows = vec![planner.setpoint().joints; 3];
+    let mut queue = case.moves.iter();
+    let mut next = queue.next();
+    let (mut ticks, mut velocity, mut acceleration) = (0u64, 0.0_f64, 0.0_f64);
+    let mut seed = 0x9e37_79b9_7f4a_7c15;
+    let per_ms = (1e-3 / period_s).round() as u64;
+    loop {
+        while let Some((geometry, mode)) = next {
+            let feed = Feed { speed: case.feed_mm_s, group: FeedGroup::Xyz };
+            let step = Move { geometry: *geometry, feed, rapid: false, mode: *mode, span: Default::default() };
+            match planner.push(step) {
+                Ok(_) => next = queue.next(),
+                Err(PushError::Full) => break,
+                Err(PushError::Plan(e)) => panic!("{e:?}"),
+            }
+            if next.is_none() {
+                planner.finish();
+            }
+            if one_per_tick {
+                break;
+            }
+        }
+        match disturbance {
+            Disturbance::None => {}
+            Disturbance::RandomOverride => {
+                if random(&mut seed) % (3 * per_ms) == 0 {
+                    let factor = (random(&mut seed) % 121) as f64 / 100.0;
+                    assert!(planner.set_feed_override(factor));
+                }
+            }
+            Disturbance::HoldThirds => planner.hold(ticks / per_ms % 300 >= 200),
+        }
+        let setpoint = planner.tick().unwrap();
+        ticks += 1;
+        rows.push(setpoint.joints);
+        let k = rows.len();
+        for j in 0..n {
+            let (a, b, c) = (rows[k - 3][j], rows[k - 2][j], rows[k - 1][j]);
+            velocity = velocity.max(((c - b) / period_s).abs() / case.velocity[j]);
+            acceleration = acceleration.max(((c - 2.0 * b + a) / (period_s * period_s)).abs() / case.acceleration[j]);
+        }
+        if setpoint.state == State::Idle && next.is_none() {
+            break;
+        }
+        assert!(ticks < 4_000_000, "never ends at {:?}", setpoint.pose);
+    }
+    Trace { duration_s: (ticks - 1) as f64 * period_s, velocity, acceleration, end: planner.setpoint().pose.to_array() }
+}
+
+fn judge(id: &str, case: &Case, t_ref_s: f64) {
+    let goal = case.moves.last().unwrap().0;
+    let goal = goal.at(goal.length()).position;
+    for (period_s, slack) in [(1e-3, 1e-6), (1e-4, 1e-5)] {
+        let trace = drive(case, period_s, Disturbance::None, false);
+        println!(
+            "{id} T={period_s}: {:.4} s = {:.4} T_ref, v {:.5} a {:.5}",
+            trace.duration_s,
+            trace.duration_s / t_ref_s,
+            trace.velocity,
+            trace.acceleration
+        );
+        assert!(trace.duration_s <= 1.01 * t_ref_s, "{id}: {} s > 1.01 * {t_ref_s}", trace.duration_s);
+        assert!(trace.duration_s >= 0.995 * t_ref_s, "{id}: faster than possible: {}", trace.duration_s);
+        assert!(trace.velocity <= 1.0 + slack, "{id}: velocity {}", trace.velocity);
+        assert!(trace.acceleration <= 1.0 + slack, "{id}: acceleration {}", trace.acceleration);
+        for (got, want) in trace.end.iter().zip(goal) {
+            assert!((got - want).abs() < 1e-9, "{id}: ends at {:?}", trace.end);
+        }
+    }
+    for (name, disturbance, one_per_tick) in [
+        ("override", Disturbance::RandomOverride, false),
+        ("hold", Disturbance::HoldThirds, false),
+        ("one per tick", Disturbance::None, true),
+    ] {
+        let trace = drive(case, PERIOD_S, disturbance, one_per_tick);
+        println!("{id} {name}: {:.4} s, v {:.5} a {:.5}", trace.duration_s, trace.velocity, trace.acceleration);
+        assert!(trace.velocity <= 1.0 + 1e-6, "{id} {name}: velocity {}", trace.velocity);
+        assert!(trace.acceleration <= 1.0 + 1e-6, "{id} {name}: acceleration {}", trace.acceleration);
+        for (got, want) in trace.end.iter().zip(goal) {
+            assert!((got - want).abs() < 1e-9, "{id} {name}: ends at {:?}", trace.end);
+        }
+    }
+}
+
+#[test]
+fn val_lines_on_moma() {
+    judge("P01", &on_moma(line(xyz(-50.0, -270.0, 0.0), xyz(50.0, -270.0, 0.0))), 1.235716);
+    judge("P02", &on_moma(line(xyz(-40.0, -310.0, 0.0), xyz(45.0, -235.0, 0.0))), 1.556699);
+    judge("P06", &on_moma(line(xyz(-70.0, -250.0, 0.0), xyz(70.0, -250.0, 0.0))), 2.258514);
+    let mut p07 = on_moma(line(xyz(-50.0, -270.0, 0.0), xyz(50.0, -270.0, 0.0)));
+    p07.feed_mm_s = 40.0;
+    judge("P07", &p07, 2.571705);
+}
+
+#[test]
+fn val_circle_on_moma() {
+    let start = xyz(40.0, -265.0, 0.0);
+    let arc = pkm_planner::path::Arc::new(start, start, [0.0, -265.0, 0.0], [0.0, 0.0, 1.0], 1).unwrap();
+    judge("P03", &on_moma(vec![(Geometry::Arc(arc), PathMode::ExactPath)]), 3.047725);
+}
+
+#[test]
+fn val_chords_on_moma() {
+    judge("P04", &on_moma(polyline(&flower(1000), blend(0.01))), 4.688393);
+    judge("P13", &on_moma(polyline(&flower(10000), blend(0.01))), 4.674384);
+    let mut p14 = on_moma(polyline(&flower(1000), blend(0.01)));
+    p14.feed_mm_s = 50.0;
+    judge("P14", &p14, 6.76232);
+    let rounded: Vec<Vector> =
+        flower(3000).iter().map(|p| p.map(|x| (x * 1000.0).round_ties_even() / 1000.0)).collect();
+    judge("P15", &on_moma(polyline(&rounded, blend(0.01))), 5.065943);
+}
+
+#[test]
+fn val_zigzag_on_moma() {
+    judge("P05", &on_moma(polyline(&zigzag(), blend(0.1))), 3.040093);
+    judge("P16", &on_moma(polyline(&zigzag(), PathMode::ExactStop)), 3.447631);
+}
+
+#[test]
+fn val_trapezoid_on_identity() {
+    let to = xyz(100.0 * libm::cos(PI / 6.0), 100.0 * libm::sin(PI / 6.0), 0.0);
+    let mut case = on_moma(line(xyz(0.0, 0.0, 0.0), to));
+    case.mechanism = identity(&[Axis::X, Axis::Y]);
+    judge("P08", &case, 0.966025);
+    case.moves = polyline(&zigzag(), blend(0.1));
+    judge("P09", &case, 2.46899);
+    let p17 = Case {
+        mechanism: identity(&[Axis::X, Axis::Y, Axis::Z]),
+        velocity: vec![100.0, 80.0, 40.0],
+        acceleration: vec![1000.0, 800.0, 300.0],
+        moves: line(xyz(0.0, 0.0, 0.0), xyz(30.0, -40.0, 120.0)),
+        feed_mm_s: f64::INFINITY,
+    };
+    judge("P17", &p17, 3.1333);
+}
