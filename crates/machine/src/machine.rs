@@ -1,0 +1,589 @@
+//! A machine that can run: every number finite and in range, every joint matched to the mechanism, home inside the travel.
+
+use crate::checks::{finite, identifier, integer, not_negative, positive};
+use crate::drivers::{self, DriverTiming, StepTiming};
+use crate::file::{self, MachineFile, Nanoseconds, Number};
+use crate::source::Findings;
+use pkm_canon::diagnostic::Diagnostic;
+use pkm_kins::machine::Mechanism;
+use pkm_kins::{Axis, JointKind, JointRange, Kinematics, Pose, maths};
+use std::ops::{Range, RangeInclusive};
+use toml::Spanned;
+
+/// A validated machine. Units: mm, **radians**, seconds, and ns where the name says so.
+#[derive(Debug, Clone)]
+pub struct Machine {
+    /// Name: letters, digits, `-`, `_`, `.`.
+    pub name: String,
+    /// One line for a person.
+    pub description: String,
+    /// Where the geometry comes from.
+    pub source: String,
+    /// Pose ⇄ joints.
+    pub mechanism: Mechanism,
+    /// In joint order; as many as the mechanism has.
+    pub joints: Vec<Joint>,
+    /// Limits of the axes that have any, in letter order.
+    pub axes: Vec<AxisLimits>,
+    /// Where the machine stands at the start: reachable, inside the travel, away from singularities.
+    pub home: Pose,
+    /// Servo period.
+    pub servo_period_ns: u64,
+    /// Grid of all step and direction edges; the servo period is a multiple of it.
+    pub timer_period_ns: u64,
+    /// Path settings.
+    pub path: PathSettings,
+    /// Bounds for the singularity measures.
+    pub singularity: SingularityGuard,
+}
+
+/// One joint: mm or rad, as the mechanism's [`JointKind`] says.
+#[derive(Debug, Clone)]
+pub struct Joint {
+    /// Name, unique in the machine.
+    pub name: String,
+    /// Length or angle.
+    pub kind: JointKind,
+    /// Travel, mm or rad.
+    pub range: JointRange,
+    /// mm/s or rad/s
+    pub max_velocity: f64,
+    /// mm/s² or rad/s²
+    pub max_acceleration: f64,
+    /// Steps per mm or rad, above 0.
+    pub steps_per_unit: f64,
+    /// As configured; never shorter than the driver's minima.
+    pub timing: StepTiming,
+    /// The driver and its minima.
+    pub driver: DriverTiming,
+}
+
+/// Limits of one axis; what is absent is limited by the joints alone.
+#[derive(Debug, Clone, Copy)]
+pub struct AxisLimits {
+    /// The axis.
+    pub axis: Axis,
+    /// Soft limits, mm or rad.
+    pub range: Option<JointRange>,
+    /// mm/s or rad/s
+    pub max_velocity: Option<f64>,
+    /// mm/s² or rad/s²
+    pub max_acceleration: Option<f64>,
+}
+
+/// Path settings.
+#[derive(Debug, Clone, Copy)]
+pub struct PathSettings {
+    /// Tolerance of G64 without P, mm; 0 = exact path.
+    pub blend_tolerance: f64,
+}
+
+/// Bounds for the dimensionless measures of [`pkm_kins::Singularity`].
+#[derive(Debug, Clone, Copy)]
+pub struct SingularityGuard {
+    /// A pose nearer than this is refused.
+    pub guard: f64,
+    /// A program that comes nearer than this is warned about.
+    pub warn: f64,
+}
+
+const SERVO_PERIOD_NS: RangeInclusive<i64> = 10_000..=100_000_000;
+const TIMER_PERIOD_NS: RangeInclusive<i64> = 1..=1_000_000;
+const DRIVER_TIME_NS: RangeInclusive<i64> = 1..=1_000_000_000;
+const DEFAULT_TIMER_PERIOD_NS: u64 = 100;
+const DEFAULT_GUARD: f64 = 0.001;
+const DEFAULT_WARN: f64 = 0.05;
+/// How far forward(inverse(home)) may be from home, mm or rad.
+const HOME_TOLERANCE: f64 = 1e-6;
+
+impl Machine {
+    /// Travel of all joints, mm or rad.
+    pub fn joint_ranges(&self) -> Vec<JointRange> {
+        self.joints.iter().map(|joint| joint.range).collect()
+    }
+
+    /// Limits of one axis, if it has any.
+    pub fn axis(&self, axis: Axis) -> Option<&AxisLimits> {
+        self.axes.iter().find(|limits| limits.axis == axis)
+    }
+}
+
+impl TryFrom<MachineFile> for Machine {
+    type Error = Vec<Diagnostic>;
+
+    /// # Errors
+    /// All findings about the file, in file order.
+    fn try_from(file: MachineFile) -> Result<Self, Vec<Diagnostic>> {
+        let mut findings = Findings::new(&file.source);
+        let machine = build(&file, &mut findings);
+        match machine {
+            Some(machine) if findings.is_empty() => Ok(machine),
+            _ => Err(findings.into_list()),
+        }
+    }
+}
+
+/// Builds the machine, noting every finding on the way; `None` if any part is missing.
+fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
+    let tables = &file.tables;
+    let name = identifier("name", &tables.name, findings);
+    let servo_period_ns = integer("servo.period_ns", &tables.servo.period_ns, SERVO_PERIOD_NS, findings);
+    let timer_period_ns = match &tables.stepgen.timer_period_ns {
+        Some(period) => integer("stepgen.timer_period_ns", period, TIMER_PERIOD_NS, findings),
+        None => Some(DEFAULT_TIMER_PERIOD_NS),
+    };
+    if let (Some(servo_ns), Some(timer_ns)) = (servo_period_ns, timer_period_ns)
+        && servo_ns % timer_ns != 0
+    {
+        let message =
+            format!("servo.period_ns = {servo_ns} is not a multiple of stepgen.timer_period_ns = {timer_ns}");
+        let help = "change one of the two, so that every servo tick falls on the grid of the step edges";
+        findings.error("machine-range", tables.servo.period_ns.span(), message, help);
+    }
+    let path = path(tables, findings);
+    let singularity = singularity(tables, findings);
+    let mechanism = file.kinematics.get_ref().build(file.kinematics.span(), findings);
+    let joints =
+        mechanism.as_ref().and_then(|mechanism| joints(tables, mechanism, timer_period_ns?, findings));
+    let axes = mechanism.as_ref().map(|mechanism| axes(tables, mechanism, findings));
+    let home = mechanism.as_ref().and_then(|mechanism| {
+        home(tables, mechanism, joints.as_deref()?, axes.as_deref()?, singularity?, findings)
+    });
+    Some(Machine {
+        name: name?,
+        description: tables.description.clone(),
+        source: tables.source.clone(),
+        mechanism: mechanism?,
+        joints: joints?,
+        axes: axes?,
+        home: home?,
+        servo_period_ns: servo_period_ns?,
+        timer_period_ns: timer_period_ns?,
+        path: path?,
+        singularity: singularity?,
+    })
+}
+
+fn path(tables: &file::Tables, findings: &mut Findings<'_>) -> Option<PathSettings> {
+    let blend_tolerance = match &tables.path.blend_tolerance_mm {
+        Some(number) => not_negative("path.blend_tolerance_mm", number, findings)?,
+        None => 0.0,
+    };
+    Some(PathSettings { blend_tolerance })
+}
+
+fn singularity(tables: &file::Tables, findings: &mut Findings<'_>) -> Option<SingularityGuard> {
+    let mut bound = |key: &str, number: &Option<Number>, default: f64| match number {
+        Some(number) => {
+            let value = finite(key, number, findings)?;
+            if !(0.0..1.0).contains(&value) {
+                let message = format!("{key} = {value} is not a measure from 0 to below 1");
+                findings.error("machine-range", number.span(), message, "0.05 is a usual value");
+                return None;
+            }
+            Some(value)
+        }
+        None => Some(default),
+    };
+    let guard = bound("singularity.guard", &tables.singularity.guard, DEFAULT_GUARD);
+    let warn = bound("singularity.warn", &tables.singularity.warn, DEFAULT_WARN);
+    Some(SingularityGuard { guard: guard?, warn: warn? })
+}
+
+fn joints(
+    tables: &file::Tables,
+    mechanism: &Mechanism,
+    timer_period_ns: u64,
+    findings: &mut Findings<'_>,
+) -> Option<Vec<Joint>> {
+    let written = tables.joint.get_ref();
+    let count = mechanism.joint_count();
+    if written.len() != count {
+        let message = format!("{} [[joint]] tables, but the mechanism has {count} joints", written.len());
+        let span = written.get(count).map_or(tables.joint.span(), Spanned::span);
+        findings.error(
+            "machine-joint-count",
+            span,
+            message,
+            "write one [[joint]] table per joint, in joint order",
+        );
+        return None;
+    }
+    for (index, joint) in written.iter().enumerate() {
+        let name = &joint.get_ref().name;
+        if written[..index].iter().any(|other| other.get_ref().name.get_ref() == name.get_ref()) {
+            let message = format!("two joints are named `{}`", name.get_ref());
+            findings.error(
+                "machine-repeated-name",
+                name.span(),
+                message,
+                "give every joint a name of its own",
+            );
+        }
+    }
+    let built: Vec<Option<Joint>> = written
+        .iter()
+        .enumerate()
+        .map(|(index, joint)| {
+            let driver = joint.get_ref().driver.as_ref().or(tables.driver.as_ref());
+            build_joint(joint, mechanism.joint_kind(index), driver, timer_period_ns, findings)
+        })
+        .collect();
+    built.into_iter().collect()
+}
+
+fn build_joint(
+    joint: &Spanned<file::Joint>,
+    kind: JointKind,
+    driver: Option<&Spanned<file::Driver>>,
+    timer_period_ns: u64,
+    findings: &mut Findings<'_>,
+) -> Option<Joint> {
+    let span = joint.span();
+    let joint = joint.get_ref();
+    let name = identifier("joint name", &joint.name, findings);
+    let label = format!("joint {}: ", joint.name.get_ref());
+    let linear = [
+        ("min_mm", &joint.min_mm),
+        ("max_mm", &joint.max_mm),
+        ("max_velocity_mm_s", &joint.max_velocity_mm_s),
+        ("max_acceleration_mm_s2", &joint.max_acceleration_mm_s2),
+        ("steps_per_mm", &joint.steps_per_mm),
+    ];
+    let rotary = [
+        ("min_deg", &joint.min_deg),
+        ("max_deg", &joint.max_deg),
+        ("max_velocity_deg_s", &joint.max_velocity_deg_s),
+        ("max_acceleration_deg_s2", &joint.max_acceleration_deg_s2),
+        ("steps_per_deg", &joint.steps_per_deg),
+    ];
+    let (fields, foreign, what) = match kind {
+        JointKind::Linear => (linear, rotary, "linear: its keys end in _mm"),
+        JointKind::Rotary => (rotary, linear, "rotary: its keys end in _deg"),
+    };
+    for (key, number) in foreign {
+        if let Some(number) = number {
+            let message = format!("{label}`{key}`, but the joint is {what}");
+            findings.error("machine-unit", number.span(), message, "use the key of the other unit");
+        }
+    }
+    let [min, max, velocity, acceleration, steps] = fields.map(|(key, number)| {
+        if number.is_none() {
+            let message = format!("{label}`{key}` is missing");
+            findings.error("machine-missing-key", span.clone(), message, "add it to this [[joint]] table");
+        }
+        Some((format!("{label}{key}"), number.as_ref()?))
+    });
+    let range = range(min, max, kind, findings);
+    let mut positive_of =
+        |field: Option<(String, &Number)>| field.and_then(|(key, number)| positive(&key, number, findings));
+    let (max_velocity, max_acceleration) = (positive_of(velocity.clone()), positive_of(acceleration));
+    let steps_per_unit = positive_of(steps);
+    let (driver, timing) = build_driver(&label, driver, &span, timer_period_ns, findings).unzip();
+    if let (Some(per_second), Some(per_unit), Some(timing), Some((key, number))) =
+        (max_velocity, steps_per_unit, &timing, &velocity)
+    {
+        let shortest_ns = timing.on_grid(timer_period_ns).shortest_pulse_interval_ns();
+        let fastest = 1e9 / shortest_ns as f64;
+        if per_second * per_unit > fastest {
+            let message = format!(
+                "{key} = {per_second} needs {} steps/s, but the driver timing allows {fastest:.0} \
+                 ({shortest_ns} ns from pulse to pulse)",
+                per_second * per_unit
+            );
+            let help = format!(
+                "at most {} at {per_unit} steps per unit; or fewer steps, or a faster driver",
+                fastest / per_unit
+            );
+            findings.error("machine-step-rate", number.span(), message, &help);
+        }
+    }
+    let face = |value: f64, per_unit: bool| match (kind, per_unit) {
+        (JointKind::Linear, _) => value,
+        (JointKind::Rotary, false) => maths::radians(value),
+        (JointKind::Rotary, true) => maths::degrees(value),
+    };
+    Some(Joint {
+        name: name?,
+        kind,
+        range: range?,
+        max_velocity: face(max_velocity?, false),
+        max_acceleration: face(max_acceleration?, false),
+        steps_per_unit: face(steps_per_unit?, true),
+        timing: timing?,
+        driver: driver?,
+    })
+}
+
+/// The driver with its minima, and the times to use: as configured, or the minima; never shorter than these.
+fn build_driver(
+    label: &str,
+    driver: Option<&Spanned<file::Driver>>,
+    joint_span: &Range<usize>,
+    timer_period_ns: u64,
+    findings: &mut Findings<'_>,
+) -> Option<(DriverTiming, StepTiming)> {
+    let known = || drivers::DRIVERS.map(|(name, _)| name).join(", ");
+    let Some(driver) = driver else {
+        let help = format!("add [driver] with `model` ({}) or `minimum`", known());
+        findings.error("machine-driver", joint_span.clone(), format!("{label}no driver is stated"), &help);
+        return None;
+    };
+    let span = driver.span();
+    let driver = driver.get_ref();
+    let (model, minimum) = match (&driver.model, &driver.minimum) {
+        (Some(model), None) => {
+            let Some((model, minimum)) = drivers::find(model.get_ref()) else {
+                let message = format!("{label}no data sheet of a driver `{}` is known", model.get_ref());
+                let help = format!("known are {}; for others give `minimum` in place of `model`", known());
+                findings.error("machine-driver", model.span(), message, &help);
+                return None;
+            };
+            (model, minimum)
+        }
+        (None, Some(minimum)) => {
+            let written = minimum.get_ref();
+            let mut time = |key: &str, time: &Nanoseconds| {
+                integer(&format!("{label}driver.minimum.{key}"), time, DRIVER_TIME_NS, findings)
+            };
+            let step_length_ns = time("step_length_ns", &written.step_length_ns);
+            let step_space_ns = time("step_space_ns", &written.step_space_ns);
+            let direction_setup_ns = time("direction_setup_ns", &written.direction_setup_ns);
+            let direction_hold_ns = time("direction_hold_ns", &written.direction_hold_ns);
+            let minimum = StepTiming {
+                step_length_ns: step_length_ns?,
+                step_space_ns: step_space_ns?,
+                direction_setup_ns: direction_setup_ns?,
+                direction_hold_ns: direction_hold_ns?,
+            };
+            ("custom", minimum)
+        }
+        _ => {
+            let help = format!("known models are {}", known());
+            findings.error(
+                "machine-driver",
+                span,
+                format!("{label}driver needs either `model` or `minimum`"),
+                &help,
+            );
+            return None;
+        }
+    };
+    let usual = minimum.on_grid(timer_period_ns);
+    let mut time = |key: &str, written: &Option<Nanoseconds>, minimum_ns: u64, usual_ns: u64| {
+        let Some(written) = written else { return Some(usual_ns) };
+        let time_ns = integer(&format!("{label}driver.{key}"), written, DRIVER_TIME_NS, findings)?;
+        if time_ns < minimum_ns {
+            let message = format!(
+                "{label}driver.{key} = {time_ns} ns is shorter than the {minimum_ns} ns that {model} needs"
+            );
+            findings.error(
+                "machine-driver-timing",
+                written.span(),
+                message,
+                &format!("write {usual_ns} or more"),
+            );
+            return None;
+        }
+        Some(time_ns)
+    };
+    let step_length_ns =
+        time("step_length_ns", &driver.step_length_ns, minimum.step_length_ns, usual.step_length_ns);
+    let step_space_ns =
+        time("step_space_ns", &driver.step_space_ns, minimum.step_space_ns, usual.step_space_ns);
+    let direction_setup_ns = time(
+        "direction_setup_ns",
+        &driver.direction_setup_ns,
+        minimum.direction_setup_ns,
+        usual.direction_setup_ns,
+    );
+    let direction_hold_ns = time(
+        "direction_hold_ns",
+        &driver.direction_hold_ns,
+        minimum.direction_hold_ns,
+        usual.direction_hold_ns,
+    );
+    let timing = StepTiming {
+        step_length_ns: step_length_ns?,
+        step_space_ns: step_space_ns?,
+        direction_setup_ns: direction_setup_ns?,
+        direction_hold_ns: direction_hold_ns?,
+    };
+    Some((DriverTiming { model: model.to_owned(), minimum }, timing))
+}
+
+fn axes(tables: &file::Tables, mechanism: &Mechanism, findings: &mut Findings<'_>) -> Vec<AxisLimits> {
+    let mut list = Vec::new();
+    for (axis, limits) in tables.axis.iter() {
+        let Some(limits) = limits else { continue };
+        let label = format!("axis.{}.", axis.letter().to_ascii_lowercase());
+        if !mechanism.axes().contains(axis) {
+            let message = format!("the mechanism has no axis {}", axis.letter());
+            findings.error("machine-axis", limits.span(), message, &format!("it has {}", letters(mechanism)));
+            continue;
+        }
+        let limits = limits.get_ref();
+        let linear = [
+            ("min_mm", &limits.min_mm),
+            ("max_mm", &limits.max_mm),
+            ("max_velocity_mm_s", &limits.max_velocity_mm_s),
+            ("max_acceleration_mm_s2", &limits.max_acceleration_mm_s2),
+        ];
+        let rotary = [
+            ("min_deg", &limits.min_deg),
+            ("max_deg", &limits.max_deg),
+            ("max_velocity_deg_s", &limits.max_velocity_deg_s),
+            ("max_acceleration_deg_s2", &limits.max_acceleration_deg_s2),
+        ];
+        let (fields, foreign, kind) = match axis.is_rotary() {
+            false => (linear, rotary, JointKind::Linear),
+            true => (rotary, linear, JointKind::Rotary),
+        };
+        for (key, number) in foreign {
+            if let Some(number) = number {
+                let message = format!("`{label}{key}` has the wrong unit for axis {}", axis.letter());
+                findings.error("machine-unit", number.span(), message, "X Y Z U V W: _mm; A B C: _deg");
+            }
+        }
+        let [min, max, velocity, acceleration] =
+            fields.map(|(key, number)| Some((format!("{label}{key}"), number.as_ref()?)));
+        let half = min.as_ref().xor(max.as_ref());
+        if let Some((key, number)) = half {
+            let message = format!("`{key}` has no counterpart");
+            findings.error(
+                "machine-missing-key",
+                number.span(),
+                message,
+                "state both ends of the range or none",
+            );
+        }
+        let unit = |value| if kind == JointKind::Rotary { maths::radians(value) } else { value };
+        let mut rate = |field: Option<(String, &Number)>| {
+            field.and_then(|(key, number)| positive(&key, number, findings)).map(unit)
+        };
+        let (max_velocity, max_acceleration) = (rate(velocity), rate(acceleration));
+        list.push(AxisLimits {
+            axis,
+            range: range(min, max, kind, findings),
+            max_velocity,
+            max_acceleration,
+        });
+    }
+    list
+}
+
+/// The home pose: it must be reachable, inside the travel, away from singularities, and come back from forward.
+fn home(
+    tables: &file::Tables,
+    mechanism: &Mechanism,
+    joints: &[Joint],
+    axes: &[AxisLimits],
+    singularity: SingularityGuard,
+    findings: &mut Findings<'_>,
+) -> Option<Pose> {
+    let mut home = Pose::ZERO;
+    let mut whole = true;
+    for (axis, number) in tables.home.get_ref().iter() {
+        let Some(number) = number else { continue };
+        let key = format!("home.{}", axis.letter().to_ascii_lowercase());
+        if !mechanism.axes().contains(axis) {
+            let message = format!("`{key}`, but the mechanism has no axis {}", axis.letter());
+            findings.error("machine-axis", number.span(), message, &format!("it has {}", letters(mechanism)));
+            whole = false;
+            continue;
+        }
+        match finite(&key, number, findings) {
+            Some(value) => home.set(axis, if axis.is_rotary() { maths::radians(value) } else { value }),
+            None => whole = false,
+        }
+    }
+    if !whole {
+        return None;
+    }
+    let span = tables.home.span();
+    let mut refuse = |message: String| {
+        findings.error("machine-home", span.clone(), message, "choose a home pose inside the workspace");
+    };
+    let reached = match mechanism.inverse(&home) {
+        Ok(reached) => reached,
+        Err(error) => {
+            refuse(format!("the home pose is refused: {error}"));
+            return None;
+        }
+    };
+    let ranges: Vec<JointRange> = joints.iter().map(|joint| joint.range).collect();
+    if let Err(limit) = JointRange::check(&ranges, &reached) {
+        refuse(format!("at the home pose {}", crate::refusal::travel(&limit, joints)));
+        return None;
+    }
+    for limits in axes {
+        let (value, letter) = (home.get(limits.axis), limits.axis.letter());
+        if let Some(range) = limits.range
+            && !(range.min..=range.max).contains(&value)
+        {
+            refuse(format!("home is outside the range of axis {letter}"));
+            return None;
+        }
+    }
+    match mechanism.forward(&reached, &home) {
+        Ok(back) if distance(&back, &home) <= HOME_TOLERANCE => {}
+        Ok(_) => {
+            refuse("the home pose belongs to another working or assembly mode".to_owned());
+            return None;
+        }
+        Err(error) => {
+            refuse(format!("the joints of the home pose have no pose: {error}"));
+            return None;
+        }
+    }
+    match mechanism.singularity(&home) {
+        Ok(measure) if measure.inverse.min(measure.forward) >= singularity.guard => Some(home),
+        Ok(measure) => {
+            let nearest = measure.inverse.min(measure.forward);
+            refuse(format!("the home pose is singular: measure {nearest:.6}, guard {}", singularity.guard));
+            None
+        }
+        Err(error) => {
+            refuse(format!("the home pose is singular: {error}"));
+            None
+        }
+    }
+}
+
+/// Largest difference of two poses in any coordinate.
+fn distance(a: &Pose, b: &Pose) -> f64 {
+    a.to_array().into_iter().zip(b.to_array()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// The mechanism's axes, e.g. `X Y U V`.
+fn letters(mechanism: &Mechanism) -> String {
+    let letters: Vec<String> = mechanism.axes().iter().map(|axis| axis.letter().to_string()).collect();
+    letters.join(" ")
+}
+
+/// A range from its two ends; both must be there, finite and in order.
+fn range(
+    min: Option<(String, &Number)>,
+    max: Option<(String, &Number)>,
+    kind: JointKind,
+    findings: &mut Findings<'_>,
+) -> Option<JointRange> {
+    let low = min.as_ref().and_then(|(key, number)| finite(key, number, findings));
+    let high = max.as_ref().and_then(|(key, number)| finite(key, number, findings));
+    let (low, high) = (low?, high?);
+    if low >= high {
+        let ((min_key, _), (max_key, number)) = (min?, max?);
+        let message = format!("{min_key} = {low} is not below {max_key} = {high}");
+        findings.error(
+            "machine-range",
+            number.span(),
+            message,
+            "the upper end must be larger than the lower",
+        );
+        return None;
+    }
+    Some(match kind {
+        JointKind::Linear => JointRange { min: low, max: high },
+        JointKind::Rotary => JointRange { min: maths::radians(low), max: maths::radians(high) },
+    })
+}

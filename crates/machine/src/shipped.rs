@@ -1,0 +1,22 @@
+//! The machines that ship, by name.
+
+/// Name and text of every shipped machine file, in the order in which they are listed.
+pub const SHIPPED: &[(&str, &str)] = &[
+    ("moma-a", include_str!("../../../machines/moma-a.toml")),
+    ("moma-b", include_str!("../../../machines/moma-b.toml")),
+    ("moma-c", include_str!("../../../machines/moma-c.toml")),
+    ("moma-d", include_str!("../../../machines/moma-d.toml")),
+    ("moma-4s-p", include_str!("../../../machines/moma-4s-p.toml")),
+    ("moma-4s-s5", include_str!("../../../machines/moma-4s-s5.toml")),
+    ("moma-4s-s10", include_str!("../../../machines/moma-4s-s10.toml")),
+    ("moma-4s-u5", include_str!("../../../machines/moma-4s-u5.toml")),
+    ("moma-4s-u10", include_str!("../../../machines/moma-4s-u10.toml")),
+    ("moma-w", include_str!("../../../machines/moma-w.toml")),
+    ("xyz", include_str!("../../../machines/xyz.toml")),
+    ("xyzabc", include_str!("../../../machines/xyzabc.toml")),
+];
+
+/// The text of a shipped machine file.
+pub fn text(name: &str) -> Option<&'static str> {
+    SHIPPED.iter().find(|(shipped, _)| *shipped == name).map(|(_, text)| *text)
+}

@@ -1,0 +1,214 @@
+//! Every shipped machine loads; every bad one is refused with a place and a remedy.
+
+use pkm_canon::diagnostic::Diagnostic;
+use pkm_kins::{Axis, Kinematics, maths};
+use pkm_machine::{Machine, shipped};
+
+fn load(name: &str, overrides: &[&str]) -> Result<Machine, Vec<Diagnostic>> {
+    let overrides: Vec<String> = overrides.iter().map(|text| (*text).to_owned()).collect();
+    Machine::load(name, &overrides)
+}
+
+/// moma-a with one piece of its text replaced.
+fn moma_a(from: &str, to: &str) -> Result<Machine, Vec<Diagnostic>> {
+    let text = shipped::text("moma-a").unwrap();
+    assert!(text.contains(from), "moma-a.toml has no {from:?}");
+    Machine::parse("test.toml", &text.replacen(from, to, 1), &[])
+}
+
+/// The first finding of a machine that must be refused, as `code line:column word`, with the word it underlines.
+#[track_caller]
+fn refusal(result: Result<Machine, Vec<Diagnostic>>) -> Diagnostic {
+    let findings = result.expect_err("the machine was accepted");
+    for finding in &findings {
+        assert!(!finding.message.is_empty() && finding.message.len() < 500, "{finding:?}");
+        assert!(finding.column <= finding.end_column, "{finding:?}");
+    }
+    findings.into_iter().next().expect("refused without a finding")
+}
+
+#[test]
+fn every_shipped_machine_loads_under_its_own_name() {
+    for (name, text) in shipped::SHIPPED {
+        let machine = load(name, &[]).unwrap_or_else(|findings| panic!("{name}: {findings:#?}"));
+        assert_eq!(machine.name, *name);
+        assert!(!machine.description.is_empty() && !machine.source.is_empty(), "{name}");
+        assert!(text.starts_with("# "), "{name} explains itself");
+        assert_eq!(machine.joints.len(), machine.mechanism.joint_count());
+        assert_eq!(machine.servo_period_ns, 1_000_000);
+        let joints = machine.inverse(&machine.home).unwrap();
+        machine.forward(&joints, &machine.home).unwrap();
+        let measure = machine.mechanism.singularity(&machine.home).unwrap();
+        assert!(measure.inverse.min(measure.forward) > machine.singularity.warn, "{name}: {measure:?}");
+    }
+}
+
+#[test]
+fn shipped_machines_have_the_coordinates_and_joints_of_the_table() {
+    for (name, axes, joints) in [
+        ("moma-a", "XY", "p1 p2"),
+        ("moma-d", "XY", "p1 p2"),
+        ("moma-4s-u10", "XY", "p1 p2"),
+        ("moma-w", "XYZUV", "p1 p2 p3 p4 p5"),
+        ("xyz", "XYZ", "x y z"),
+        ("xyzabc", "XYZABC", "x y z a b c"),
+    ] {
+        let machine = load(name, &[]).unwrap();
+        let letters: String = machine.mechanism.axes().iter().map(Axis::letter).collect();
+        assert_eq!(letters, axes, "{name}");
+        let names: Vec<&str> = machine.joints.iter().map(|joint| joint.name.as_str()).collect();
+        assert_eq!(names.join(" "), joints, "{name}");
+    }
+}
+
+#[test]
+fn rotary_joints_are_radians_inside() {
+    let machine =
+        load("xyzabc", &["joint.3.max_deg=180", "joint.3.max_velocity_deg_s=90", "joint.3.steps_per_deg=10"]);
+    let a = &machine.unwrap().joints[3];
+    assert_eq!(a.range.max, maths::PI);
+    assert_eq!(a.max_velocity, maths::PI / 2.0);
+    assert!((a.steps_per_unit - 1800.0 / maths::PI).abs() < 1e-9);
+}
+
+#[test]
+fn overrides_reach_every_index_and_optional_keys() {
+    let machine = load(
+        "moma-a",
+        &[
+            "joint.*.max_velocity_mm_s=50",
+            "joint.1.max_acceleration_mm_s2 = 250.0",
+            "axis.x.max_velocity_mm_s=20",
+            "kinematics.l_mm=[196, 197]",
+            "kinematics.l_mm.0=198",
+            "driver.model=TMC2209",
+            "servo.period_ns=500_000",
+        ],
+    )
+    .unwrap();
+    assert_eq!(machine.joints[0].max_velocity, 50.0);
+    assert_eq!(machine.joints[1].max_velocity, 50.0);
+    assert_eq!(machine.joints[0].max_acceleration, 1000.0);
+    assert_eq!(machine.joints[1].max_acceleration, 250.0);
+    assert_eq!(machine.axis(Axis::X).unwrap().max_velocity, Some(20.0));
+    assert_eq!(machine.joints[0].driver.model, "TMC2209");
+    assert_eq!(machine.joints[0].timing.step_length_ns, 200);
+    assert_eq!(machine.servo_period_ns, 500_000);
+}
+
+#[test]
+fn overrides_that_match_nothing_are_refused() {
+    for text in [
+        "joint.7.min_mm=1",
+        "joints.*.min_mm=1",
+        "nothing.*=1",
+        "name.x=1",
+        "joint..min_mm=1",
+        "=1",
+        "novalue",
+    ] {
+        let finding = refusal(load("moma-a", &[text]));
+        assert_eq!((finding.code.as_str(), finding.file.as_str()), ("machine-override", "--set"), "{text}");
+    }
+    let finding = refusal(load("moma-a", &["servo.period_ns=1000000", "srvo.period_ns=1"]));
+    assert_eq!((finding.code.as_str(), finding.line, finding.column), ("machine-unknown-key", 2, 1));
+    let finding = refusal(load("moma-a", &["joint.*.max_velocity_mm_s=nan"]));
+    assert_eq!((finding.code.as_str(), finding.file.as_str()), ("machine-not-finite", "--set"));
+    assert_eq!((finding.column, finding.end_column), (27, 30));
+}
+
+#[test]
+fn bad_files_are_refused_at_their_place() {
+    // (text to replace, replacement, code, word under the marker)
+    let cases = [
+        ("max_mm = 200", "max_mm = nan", "machine-not-finite", "nan"),
+        ("max_mm = 200", "max_mm = inf", "machine-not-finite", "inf"),
+        ("max_mm = 200", "max_mm = -1", "machine-range", "-1"),
+        ("max_mm = 200", "max_mm = 1e300", "machine-range", "1e300"),
+        ("max_mm = 200", "max_mm = 1e400", "machine-wrong-type", "1e400"),
+        ("max_mm = 200", "max_mm = \"far\"", "machine-wrong-type", "\"far\""),
+        ("max_mm = 200", "max_deg = 200", "machine-missing-key", "[[joint]]"),
+        ("max_mm = 200", "max_mm = 200\nmax_deg = 3", "machine-unit", "3"),
+        ("max_mm = 200", "max_mm = 200\nmax_mm = 200", "machine-repeated-key", "max_mm"),
+        ("max_mm = 200", "maximum_mm = 200", "machine-unknown-key", "maximum_mm"),
+        ("max_velocity_mm_s = 100", "max_velocity_mm_s = 0", "machine-not-positive", "0"),
+        ("max_velocity_mm_s = 100", "max_velocity_mm_s = 1000", "machine-step-rate", "1000"),
+        ("steps_per_mm = 400", "steps_per_mm = -400", "machine-not-positive", "-400"),
+        ("name = \"p2\"", "name = \"p1\"", "machine-repeated-name", "\"p1\""),
+        ("name = \"p2\"", "name = \"\"", "machine-name", "\"\""),
+        ("l_mm = [195, 195]", "l_mm = [195, 0]", "machine-geometry", "0"),
+        ("l_mm = [195, 195]", "l_mm = [nan, 195]", "machine-geometry", "nan"),
+        ("l_mm = [195, 195]", "l_mm = [195]", "machine-wrong-type", "[195]"),
+        ("assembly = -1", "assembly = 0", "machine-geometry", "0"),
+        ("[[-100, 0], [100, 0]]", "[[-400, 0], [400, 0]]", "machine-home", "[home]"),
+        ("type = \"moma\"", "type = \"mona\"", "machine-mechanism", "\"mona\""),
+        ("type = \"moma\"", "", "machine-missing-key", "[kinematics]"),
+        ("period_ns = 1_000_000", "period_ns = 0", "machine-range", "0"),
+        ("period_ns = 1_000_000", "period_ns = 1_000_001", "machine-range", "1_000_001"),
+        ("period_ns = 1_000_000", "period_ns = 1e6", "machine-wrong-type", "1e6"),
+        ("timer_period_ns = 100", "timer_period_ns = -1", "machine-range", "-1"),
+        ("blend_tolerance_mm = 0.05", "blend_tolerance_mm = -0.05", "machine-range", "-0.05"),
+        ("guard = 0.001", "guard = nan", "machine-not-finite", "nan"),
+        ("model = \"DRV8825\"", "model = \"DRV9000\"", "machine-driver", "\"DRV9000\""),
+        ("model = \"DRV8825\"", "model = \"DRV8825\"\nstep_length_ns = 500", "machine-driver-timing", "500"),
+        ("model = \"DRV8825\"", "", "machine-driver", "[driver]"),
+        ("y = -265", "y = -100", "machine-home", "[home]"),
+        ("y = -265", "y = nan", "machine-not-finite", "nan"),
+        ("y = -265", "y = -265\nz = 0", "machine-axis", "0"),
+        ("y = -265", "y = -265\n[axis.z]", "machine-axis", "[axis.z]"),
+        ("y = -265", "y = -265\n[axis.q]", "machine-unknown-key", "q"),
+        ("y = -265", "y = -265\n[axis.x]\nmin_mm = 0", "machine-missing-key", "0"),
+        ("y = -265", "y = -265\n[axis.x]\nmin_mm = 1\nmax_mm = 2", "machine-home", "[home]"),
+        ("y = -265", "y = -265\n[[joint]]\nname = \"p3\"", "machine-joint-count", "[[joint]]"),
+        ("[servo]", "[servo", "machine-syntax", ""),
+        ("name = \"moma-a\"", "", "machine-missing-key", ""),
+    ];
+    for (from, to, code, word) in cases {
+        let finding = refusal(moma_a(from, to));
+        assert_eq!(finding.code, code, "{to:?}: {finding:?}");
+        assert_eq!(finding.file, "test.toml");
+        if !word.is_empty() {
+            let text = shipped::text("moma-a").unwrap().replacen(from, to, 1);
+            let line = text.lines().nth(finding.line as usize - 1).unwrap();
+            let marked = &line[finding.column as usize - 1..finding.end_column as usize - 1];
+            assert_eq!(marked, word, "{to:?}: {finding:?}");
+        }
+    }
+}
+
+#[test]
+fn a_fault_in_the_second_mechanism_is_shown_there() {
+    let text = shipped::text("moma-w").unwrap();
+    let second = text.rfind("l_mm = [195, 195]").unwrap();
+    let text = format!("{}l_mm = [195, -1]{}", &text[..second], &text[second + "l_mm = [195, 195]".len()..]);
+    let finding = refusal(Machine::parse("w.toml", &text, &[]));
+    let line = text[..second].matches('\n').count() as u32 + 1;
+    assert_eq!(
+        (finding.code.as_str(), finding.line, finding.column),
+        ("machine-geometry", line, 14),
+        "{finding:?}"
+    );
+}
+
+#[test]
+fn all_findings_are_collected() {
+    let text = shipped::text("moma-a")
+        .unwrap()
+        .replace("max_mm = 200", "max_mm = nan")
+        .replace("y = -265", "y = inf");
+    let findings = Machine::parse("test.toml", &text, &[]).unwrap_err();
+    assert_eq!(findings.len(), 2, "{findings:#?}"); // home is not judged while the joints are unknown
+}
+
+#[test]
+fn unreadable_files_are_refused() {
+    assert_eq!(refusal(load("no/such/file.toml", &[])).code, "machine-unreadable");
+    assert_eq!(refusal(load("/", &[])).code, "machine-unreadable");
+    assert_eq!(refusal(Machine::parse("big.toml", &"#".repeat(2 << 20), &[])).code, "machine-too-large");
+    assert_eq!(refusal(Machine::parse("empty.toml", "", &[])).code, "machine-missing-key");
+    assert_eq!(refusal(Machine::parse("deep.toml", &"[".repeat(1 << 20), &[])).code, "machine-syntax");
+    let deep = format!("a = {}", "[".repeat(500_000));
+    assert_eq!(refusal(Machine::parse("deep.toml", &deep, &[])).code, "machine-syntax");
+    let dotted = format!("{}a = 1", "a.".repeat(400_000));
+    refusal(Machine::parse("dotted.toml", &dotted, &[]));
+}
