@@ -139,16 +139,31 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// The open end of the last move is released when the machine would have to brake for want of it.
     fn release_if_starving(&mut self) {
-        if !self.pieces.back().is_some_and(|last| last.open) || self.nodes.len() > 2 * 32 {
-            return;
-        }
-        let (feed, rapid) = self.executor.overrides();
-        let limited_to_the_end =
-            self.nodes.iter().skip(1).all(|node| node.entry < node.cap(feed, rapid) * (1.0 - 1e-9) || node.stop);
-        if limited_to_the_end {
+        let last = self.first_piece + (self.pieces.len() as u64).saturating_sub(1);
+        let all_known =
+            self.grid.piece == last && self.pieces.back().is_some_and(|p| p.open && self.grid.s >= p.to);
+        if all_known && self.brakes_now() {
             self.finish();
             let _ = self.refill();
         }
+    }
+
+    /// True when hardest braking from here ends less than two servo periods before the end of what is known.
+    fn brakes_now(&self) -> bool {
+        let rows = self.limits.rows();
+        let mut x = self.executor.x;
+        let margin = 2.0 * sqrt(x) * self.settings.servo_period_s;
+        let mut rest = 0.0;
+        let mut previous: Option<&crate::grid::Node<R>> = None;
+        // The interval being driven counts as driven.
+        for node in self.nodes.iter().skip(1) {
+            if let Some(from) = previous {
+                x = if x > 0.0 { exits(&from.right, &node.left, rows, from.length, x).0 } else { 0.0 };
+                rest += if x > 0.0 { 0.0 } else { from.length };
+            }
+            previous = Some(node);
+        }
+        rest <= margin
     }
 
     /// Drives along the nodes for `time` seconds, or to the next stop.
@@ -227,17 +242,26 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             if x == 0.0 {
                 return false;
             }
-            (leg_end, x_end) = braking(&here, &next.left, rows, length, x);
+            (leg_end, x_end) = braking(&here, &next.left, rows, length, x, self.executor.x_end);
         } else {
             let (low, high) = exits(&here, &next.left, rows, length, x);
-            x_end = if low <= high { next.entry.clamp(low, high) } else { 0.5 * (low + high) };
+            // From the middle of an interval the strips may miss each other by what changes within it; the leg being
+            // driven stays admissible.
+            x_end = match low <= high {
+                true => next.entry.clamp(low, high),
+                false if sigma > 0.0 => self.executor.x_end,
+                false => 0.5 * (low + high),
+            };
             leg_end = length;
             if x == 0.0 && x_end == 0.0 && length > 0.0 {
                 // From rest to rest within one interval (resumed after a hold): up to the middle, then down.
                 let cap = node.cap(feed, rapid).max(next.cap(feed, rapid));
-                x_end = halfway(&here, &next.left, rows, length).min(if node.stop { f64::INFINITY } else { cap });
+                x_end =
+                    halfway(&here, &next.left, rows, length).min(if node.stop { f64::INFINITY } else { cap });
                 leg_end = 0.5 * length;
-                if !(x_end > 0.0) || self.nodes.len() == 2 && !next.stop && self.pieces.back().is_some_and(|p| p.open) {
+                if !(x_end > 0.0)
+                    || self.nodes.len() == 2 && !next.stop && self.pieces.back().is_some_and(|p| p.open)
+                {
                     return false;
                 }
             }
@@ -262,7 +286,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let pose = Pose::from_array(point.position);
         let velocity = Pose::from_array(point.first.map(|d| d * speed));
         let motion = self.kinematics.motion(&pose, &velocity, &Pose::ZERO);
-        let motion = motion.map_err(|e| PlanError { kind: crate::PlanErrorKind::Unreachable(e), span: piece.span, pose })?;
+        let motion = motion.map_err(|e| PlanError {
+            kind: crate::PlanErrorKind::Unreachable(e),
+            span: piece.span,
+            pose,
+        })?;
         self.setpoint = Setpoint {
             pose,
             joints: motion.position,
@@ -277,10 +305,21 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 }
 
 /// Hardest braking: (distance, x at its end). Stops inside the interval if it can.
-fn braking<const R: usize>(here: &Rows<R>, next: &Rows<R>, rows: usize, length: f64, x: f64) -> (f64, f64) {
-    let (low, _) = exits(here, next, rows, length, x);
+/// `running` is the x at which the leg driven so far would end.
+fn braking<const R: usize>(
+    here: &Rows<R>,
+    next: &Rows<R>,
+    rows: usize,
+    length: f64,
+    x: f64,
+    running: f64,
+) -> (f64, f64) {
+    let (low, high) = exits(here, next, rows, length, x);
+    if low > high {
+        return (length, running);
+    }
     if low > 0.0 {
-        return (length, low.min(x));
+        return (length, low);
     }
     // The strips must hold from x down to rest at both ends: |d₁ a + d₂ x| ≤ 1 and |d₁ a| ≤ 1.
     let mut hardest = f64::INFINITY;

@@ -201,4 +201,3 @@ impl Frame {
         Event::Move(Move { geometry, feed, rapid: false, mode: self.mode, span })
     }
 }
-

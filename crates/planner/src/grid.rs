@@ -1,6 +1,6 @@
 //! Nodes along the path, and the look-ahead over them.
 //!
-//! The grid walks along the pieces and sets a node wherever the strips (see `limits`) have changed by 5 % or the
+//! The grid walks along the pieces and sets a node wherever the strips (see `limits`) have changed by 2 % or the
 //! speed could have changed by a few percent. The look-ahead then computes for every node, from the end of what is
 //! known backwards, the largest x = ṡ² from which the machine can still follow: the controllable set of TOPP-RA.
 
@@ -12,9 +12,9 @@ use crate::planner::{Piece, Planner};
 use pkm_kins::{Kinematics, maths::sqrt};
 
 /// Change of the strips from node to node, in shares of the limits.
-const CHANGE: f64 = 0.05;
+const CHANGE: f64 = 0.02;
 /// Nodes per distance in which the machine reaches full speed.
-const NODES_PER_RAMP: f64 = 16.0;
+const NODES_PER_RAMP: f64 = 40.0;
 /// The speed is held so low that no more than about twice this many nodes are passed in a servo period.
 const NODES_PER_TICK: usize = 64;
 /// Nodes added in one go: bounds the work of a tick.

@@ -71,7 +71,11 @@ impl<const R: usize> Limits<R> {
     /// # Errors
     /// [`LimitsError`]: a joint's velocity or acceleration limit is not finite and > 0, an axis limit is not > 0, a
     /// range is empty or NaN, or there are more rows than `R`.
-    pub fn new(joints: &[JointLimits], axes: &[AxisLimits], singularity_guard: f64) -> Result<Self, LimitsError> {
+    pub fn new(
+        joints: &[JointLimits],
+        axes: &[AxisLimits],
+        singularity_guard: f64,
+    ) -> Result<Self, LimitsError> {
         let rows = joints.len() + axes.len();
         let too_many = LimitsError::TooMany { rows, room: R };
         if rows > R {
@@ -79,7 +83,10 @@ impl<const R: usize> Limits<R> {
         }
         let good = |limit: f64| limit > 0.0 && limit.is_finite();
         for (i, joint) in joints.iter().enumerate() {
-            if !good(joint.max_velocity) || !good(joint.max_acceleration) || !(joint.range.min < joint.range.max) {
+            if !good(joint.max_velocity)
+                || !good(joint.max_acceleration)
+                || !(joint.range.min < joint.range.max)
+            {
                 return Err(LimitsError::Joint(i));
             }
         }
@@ -104,7 +111,9 @@ impl<const R: usize> Limits<R> {
     /// Checks a pose and its joints against travel.
     pub(crate) fn check_travel(&self, pose: &Pose, joints: &Joints) -> Result<(), PlanErrorKind> {
         for (joint, (limits, &value)) in self.joints.iter().zip(joints).enumerate() {
-            if !(value >= limits.range.min - JointRange::TOLERANCE && value <= limits.range.max + JointRange::TOLERANCE) {
+            if !(value >= limits.range.min - JointRange::TOLERANCE
+                && value <= limits.range.max + JointRange::TOLERANCE)
+            {
                 return Err(PlanErrorKind::JointTravel { joint, value, range: limits.range });
             }
         }
@@ -152,15 +161,31 @@ impl<const R: usize> Limits<R> {
             hard: FASTEST,
             feed: feed.cap(&point.first),
         };
-        let joint_rows = self.joints.iter().zip(&motion.position).zip(motion.velocity.iter().zip(&motion.acceleration));
-        let joint_rows = joint_rows.map(|((l, q), (d1, d2))| (l.max_velocity, l.max_acceleration, *q, *d1, *d2));
+        let joint_rows =
+            self.joints.iter().zip(&motion.position).zip(motion.velocity.iter().zip(&motion.acceleration));
+        let joint_rows =
+            joint_rows.map(|((l, q), (d1, d2))| (l.max_velocity, l.max_acceleration, *q, *d1, *d2));
         let axis_rows = self.axes.iter().map(|limits| {
             let k = limits.axis as usize;
             let at = |v: &[f64; 9]| v.get(k).copied().unwrap_or(0.0);
-            (limits.max_velocity, limits.max_acceleration, at(&point.position), at(&point.first), at(&point.second))
+            (
+                limits.max_velocity,
+                limits.max_acceleration,
+                at(&point.position),
+                at(&point.first),
+                at(&point.second),
+            )
         });
-        let slots = sample.rows.first.iter_mut().zip(&mut sample.rows.second).zip(&mut sample.speed).zip(&mut sample.position);
-        for ((((first, second), speed), position), (v_max, a_max, q, d1, d2)) in slots.zip(joint_rows.chain(axis_rows)) {
+        let slots = sample
+            .rows
+            .first
+            .iter_mut()
+            .zip(&mut sample.rows.second)
+            .zip(&mut sample.speed)
+            .zip(&mut sample.position);
+        for ((((first, second), speed), position), (v_max, a_max, q, d1, d2)) in
+            slots.zip(joint_rows.chain(axis_rows))
+        {
             *first = d1 / (a_max * GUARD);
             *second = d2 / (a_max * GUARD);
             *speed = d1 / (v_max * GUARD);
@@ -204,7 +229,8 @@ impl<const R: usize> Limits<R> {
             {
                 let to_turn = length * speed_a.abs() / (speed_a.abs() + speed_b.abs());
                 let value = at(&a.position) + 0.5 * speed_a * v_max * GUARD * to_turn;
-                if !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE) {
+                if !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE)
+                {
                     let kind = match self.axes.get(row.wrapping_sub(self.joints.len())) {
                         Some(limits) => PlanErrorKind::AxisTravel { axis: limits.axis, value, range },
                         None => PlanErrorKind::JointTravel { joint: row, value, range },

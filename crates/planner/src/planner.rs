@@ -293,6 +293,14 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             stop: false,
             ..*last
         };
+        // Between short chords nothing of the line itself is left.
+        let number = self.first_piece + self.pieces.len() as u64 - 1;
+        if self.grid.piece < number
+            && let Some(last) = self.pieces.back()
+            && last.to - last.from <= 1e-12
+        {
+            self.pieces.pop_back();
+        }
         self.append(blend);
         cut
     }

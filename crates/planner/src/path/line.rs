@@ -22,8 +22,11 @@ impl Line {
             FeedGroup::Xyz => feed_length(&displacement, FeedGroup::Xyz).max(norm3(&displacement, 6) * 1e-3),
             group => feed_length(&displacement, group),
         };
-        (length > 1e-12 && length.is_finite())
-            .then(|| Line { start, direction: displacement.map(|d| d / length), length })
+        (length > 1e-12 && length.is_finite()).then(|| Line {
+            start,
+            direction: displacement.map(|d| d / length),
+            length,
+        })
     }
 
     pub(super) fn at(&self, s: f64) -> Point {
