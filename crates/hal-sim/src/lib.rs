@@ -1,1 +1,37 @@
-//! Placeholder.
+//! A deterministic simulated HAL in LinuxCNC's manner, and a simulated machine on it.
+//!
+//! ```text
+//!  setpoints      ┌────────┐ joint.N.motor-pos-cmd ┌─────────┐ step, dir ┌────────┐ counts ┌───────┐
+//!  of a planner ─▶│ motion │ ─────────────────────▶│ stepgen │ ─────────▶│ driver │ ──────▶│ motor │
+//!                 └────────┘                       └─────────┘   edges   └────────┘        └───────┘
+//!                      ▲                    joint.N.motor-pos-fb                               │
+//!                      └───────────────────────────────────────────────────────────────────────┘
+//! ```
+//!
+//! * [`Hal`]: pins, signals, parameters, functions, threads.
+//! * [`components`]: one file each, the same order in each: what it is → pins → state → functions → tests.
+//! * [`Simulation`]: the machine above ready-wired, one call per servo period, with statistics and observers.
+//! * [`VcdWriter`], [`TraceWriter`]: observers that write `steps.vcd` and `trace.csv`.
+//!
+//! Time is an integer count of timer ticks; there is no clock. A [`Hal`] and a [`Simulation`] are `Clone`: a copy goes
+//! on from the same state.
+
+pub mod component;
+pub mod components;
+pub mod hal;
+pub mod simulation;
+pub mod trace;
+pub mod values;
+pub mod vcd;
+
+pub use component::{Component, Fault, PinIndex, PinName, Setpoint, SetpointSource, Tick};
+pub use components::driver::Violations;
+pub use hal::{Hal, HalError, MAX_NAME, Role};
+pub use pkm_stepgen::{Edge, Line, PulseTimingNs};
+pub use simulation::{
+    ConfigError, JointConfig, JointState, JointStatistics, Observer, Simulation, SimulationConfig, TickError,
+    TickReport,
+};
+pub use trace::TraceWriter;
+pub use values::{BitPin, FloatPin, PinType, S32Pin, U32Pin, Value, Values};
+pub use vcd::{VcdSteps, VcdWriter};

@@ -98,7 +98,7 @@ impl Cubic {
         // a u² + 2 b u + c = 0 in the form without cancellation
         let (a, b, c) = (3.0 * self.c3, self.c2, self.c1);
         let discriminant = b * b - a * c;
-        if !(discriminant > 0.0) {
+        if discriminant.is_nan() || discriminant <= 0.0 {
             return [None, None];
         }
         let root = libm::sqrt(discriminant); // correctly rounded: the same everywhere
@@ -141,7 +141,7 @@ fn on_grid(steps: f64) -> Result<i64, EdgeError> {
     if !steps.is_finite() {
         return Err(EdgeError::NotFinite);
     }
-    if !(steps >= -MAX_STEPS && steps <= MAX_STEPS) {
+    if !(-MAX_STEPS..=MAX_STEPS).contains(&steps) {
         return Err(EdgeError::OutOfRange { steps });
     }
     Ok(round_half_up(steps * ONE))

@@ -4,13 +4,13 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PulseTimingNs {
     /// Least time the step line is active.
-    pub step_length: u32,
+    pub step_length: u64,
     /// Least time the step line is inactive.
-    pub step_space: u32,
+    pub step_space: u64,
     /// Least time from a change of direction to the next active step edge.
-    pub dir_setup: u32,
+    pub dir_setup: u64,
     /// Least time from the end of a step pulse to a change of direction.
-    pub dir_hold: u32,
+    pub dir_hold: u64,
 }
 
 /// Pulse timing in timer ticks. Cannot exist unless step length and space are at least one tick.
@@ -27,6 +27,11 @@ pub struct PulseTiming {
 pub enum TimingError {
     /// The timer's period is 0 ns.
     ZeroTimerPeriod,
+    /// A pulse time of 2³¹ timer ticks or more.
+    PulseTime {
+        /// As given, ns.
+        time_ns: u64,
+    },
     /// The servo period is 0, or 2³¹ timer ticks or more.
     ServoPeriod {
         /// As given, ns.
@@ -37,7 +42,7 @@ pub enum TimingError {
         /// As given, ns.
         servo_period_ns: u64,
         /// As given, ns.
-        timer_period_ns: u32,
+        timer_period_ns: u64,
     },
 }
 
@@ -45,17 +50,20 @@ impl PulseTimingNs {
     /// In ticks of a timer of `timer_period_ns`, rounded up; step length and space are one tick at least.
     ///
     /// # Errors
-    /// `ZeroTimerPeriod`.
-    pub fn ticks(&self, timer_period_ns: u32) -> Result<PulseTiming, TimingError> {
+    /// `ZeroTimerPeriod`, `PulseTime`.
+    pub fn ticks(&self, timer_period_ns: u64) -> Result<PulseTiming, TimingError> {
         if timer_period_ns == 0 {
             return Err(TimingError::ZeroTimerPeriod);
         }
-        let up = |ns: u32| ns.div_ceil(timer_period_ns);
+        let up = |time_ns: u64| match u32::try_from(time_ns.div_ceil(timer_period_ns)) {
+            Ok(ticks) if ticks < 1 << 31 => Ok(ticks),
+            _ => Err(TimingError::PulseTime { time_ns }),
+        };
         Ok(PulseTiming {
-            step_length: up(self.step_length).max(1),
-            step_space: up(self.step_space).max(1),
-            dir_setup: up(self.dir_setup),
-            dir_hold: up(self.dir_hold),
+            step_length: up(self.step_length)?.max(1),
+            step_space: up(self.step_space)?.max(1),
+            dir_setup: up(self.dir_setup)?,
+            dir_hold: up(self.dir_hold)?,
         })
     }
 }
@@ -105,14 +113,14 @@ impl Period {
     ///
     /// # Errors
     /// Periods of 0, 2³¹ timer ticks or more in a servo period, or a servo period that is not a whole number of timer periods.
-    pub fn new(start: u64, servo_period_ns: u64, timer_period_ns: u32) -> Result<Self, TimingError> {
+    pub fn new(start: u64, servo_period_ns: u64, timer_period_ns: u64) -> Result<Self, TimingError> {
         if timer_period_ns == 0 {
             return Err(TimingError::ZeroTimerPeriod);
         }
-        if servo_period_ns % u64::from(timer_period_ns) != 0 {
+        if !servo_period_ns.is_multiple_of(timer_period_ns) {
             return Err(TimingError::NotWhole { servo_period_ns, timer_period_ns });
         }
-        let ticks = servo_period_ns / u64::from(timer_period_ns);
+        let ticks = servo_period_ns / timer_period_ns;
         match u32::try_from(ticks) {
             Ok(ticks) if ticks > 0 && ticks < 1 << 31 => {
                 Ok(Self { start, ticks, seconds: servo_period_ns as f64 / 1e9 })
@@ -151,6 +159,9 @@ impl core::fmt::Display for TimingError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match *self {
             Self::ZeroTimerPeriod => write!(f, "the timer period is 0 ns"),
+            Self::PulseTime { time_ns } => {
+                write!(f, "a pulse time of {time_ns} ns is 2^31 timer ticks or more")
+            }
             Self::ServoPeriod { servo_period_ns } => {
                 write!(f, "a servo period of {servo_period_ns} ns is not between 1 and 2^31 - 1 timer ticks")
             }

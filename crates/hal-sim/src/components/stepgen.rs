@@ -1,0 +1,173 @@
+//! `stepgen`: position commands to step and direction edges ([`pkm_stepgen`]).
+//!
+//! | pin or parameter             | type      | meaning                                                        |
+//! |------------------------------|-----------|----------------------------------------------------------------|
+//! | `stepgen.N.position-cmd`     | float in  | position at the end of the period, mm or degrees               |
+//! | `stepgen.N.velocity-cmd`     | float in  | velocity there, mm/s or degrees/s                              |
+//! | `stepgen.N.enable`           | bit in    | false: no new steps; the command is taken up where the steps stand |
+//! | `stepgen.N.step`, `.dir`     | bit out   | the lines, with their edges inside the period; dir high = positive |
+//! | `stepgen.N.counts`           | s32 out   | steps so far (wraps)                                           |
+//! | `stepgen.N.position-fb`      | float out | counts / scale                                                 |
+//! | `stepgen.N.position-scale`   | float ro  | steps per mm or degree                                         |
+//! | `stepgen.N.steplen`, `.stepspace`, `.dirsetup`, `.dirhold` | u32 ro | ns, as the edges keep them |
+//! | `stepgen.N.max-delay`        | u32 ro    | largest delay of a step for these times, ns                    |
+//!
+//! Functions: `stepgen.update-freq` makes the edges of the period, `stepgen.capture-position` shows counts and position;
+//! `stepgen.make-pulses` has nothing to do (edges have exact times without a base thread), kept for HAL files.
+//!
+//! Unlike LinuxCNC's, whose position lags by 1.5 servo periods, this one reaches the command at the period's end.
+
+use crate::component::{Component, Fault, Tick};
+use crate::hal::{Hal, HalError, Role};
+use crate::values::{BitPin, FloatPin, S32Pin, U32Pin, Values};
+use pkm_stepgen::{EdgeError, Line, PulseTimingNs, StepGenerator};
+
+/// One channel as configured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepgenChannel {
+    /// Steps per mm or degree.
+    pub position_scale: f64,
+    /// Times of its pulses.
+    pub timing: PulseTimingNs,
+    /// Where the joint stands at the start, mm or degrees.
+    pub start: f64,
+}
+
+#[derive(Debug, Clone)]
+struct Pins {
+    position_cmd: FloatPin,
+    velocity_cmd: FloatPin,
+    enable: BitPin,
+    step: BitPin,
+    dir: BitPin,
+    counts: S32Pin,
+    position_fb: FloatPin,
+    max_delay: U32Pin,
+}
+
+/// See the module.
+#[derive(Debug, Clone)]
+pub struct Stepgen {
+    channels: Vec<(StepGenerator, Pins)>,
+    timer_period_ns: u64,
+}
+
+/// Why it cannot be loaded.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StepgenError {
+    /// A pin.
+    Hal(HalError),
+    /// Scale or start position of a channel.
+    Channel(usize, EdgeError),
+}
+
+impl From<HalError> for StepgenError {
+    fn from(error: HalError) -> Self {
+        Self::Hal(error)
+    }
+}
+
+impl Stepgen {
+    /// Loads the component: pins and functions.
+    ///
+    /// # Errors
+    /// `Hal`: loaded already, or a pulse time too long. `Channel`: scale 0, not finite, or a start beyond 2³² steps.
+    pub fn load(hal: &mut Hal, channels: &[StepgenChannel]) -> Result<(), StepgenError> {
+        let timer_period_ns = hal.timer_period_ns();
+        let mut with_pins = Vec::new();
+        for (n, channel) in channels.iter().enumerate() {
+            let timing = channel.timing.ticks(timer_period_ns).map_err(HalError::from)?;
+            let generator = StepGenerator::new(n as u8, channel.position_scale, timing, channel.start)
+                .map_err(|error| StepgenError::Channel(n, error))?;
+            let name = |pin: &str| format!("stepgen.{n}.{pin}");
+            let owner = "stepgen";
+            let counts = generator.count() as i32;
+            let position = generator.position_of(generator.count());
+            let pins = Pins {
+                position_cmd: hal.new_float(owner, &name("position-cmd"), Role::In, channel.start)?,
+                velocity_cmd: hal.new_float(owner, &name("velocity-cmd"), Role::In, 0.0)?,
+                enable: hal.new_bit(owner, &name("enable"), Role::In, true)?,
+                step: hal.new_bit(owner, &name("step"), Role::Out, false)?,
+                dir: hal.new_bit(owner, &name("dir"), Role::Out, false)?,
+                counts: hal.new_s32(owner, &name("counts"), Role::Out, counts)?,
+                position_fb: hal.new_float(owner, &name("position-fb"), Role::Out, position)?,
+                max_delay: hal.new_u32(owner, &name("max-delay"), Role::ReadOnly, 0)?,
+            };
+            hal.new_float(owner, &name("position-scale"), Role::ReadOnly, channel.position_scale)?;
+            for (pin, ticks) in [
+                ("steplen", timing.step_length()),
+                ("stepspace", timing.step_space()),
+                ("dirsetup", timing.dir_setup()),
+                ("dirhold", timing.dir_hold()),
+            ] {
+                hal.new_u32(owner, &name(pin), Role::ReadOnly, nanoseconds(ticks, timer_period_ns))?;
+            }
+            with_pins.push((generator, pins));
+        }
+        let functions = ["make-pulses", "update-freq", "capture-position"].map(|f| format!("stepgen.{f}"));
+        hal.add_component(Box::new(Self { channels: with_pins, timer_period_ns }), &functions)?;
+        Ok(())
+    }
+
+    /// The generators, in channel order.
+    pub fn generators(&self) -> impl Iterator<Item = &StepGenerator> {
+        self.channels.iter().map(|(generator, _)| generator)
+    }
+
+    fn update(&mut self, values: &mut Values, tick: &Tick<'_>) -> Result<(), Fault> {
+        let (start, end) = (tick.period.start(), tick.period.end());
+        for (n, (generator, pins)) in self.channels.iter_mut().enumerate() {
+            values.edges_mut(pins.step).retire(start);
+            values.edges_mut(pins.dir).retire(start);
+            let (position, velocity) = if values.bit(pins.enable) {
+                (values.float(pins.position_cmd), values.float(pins.velocity_cmd))
+            } else {
+                (generator.position_of(generator.count()), 0.0)
+            };
+            generator
+                .advance(position, velocity, &tick.period, |edge| {
+                    let pin = if edge.line == Line::Step { pins.step } else { pins.dir };
+                    values.edges_mut(pin).push(edge.time, edge.level);
+                })
+                .map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error })?;
+            for pin in [pins.step, pins.dir] {
+                if let Some(level) = values.edges(pin).level_at(end) {
+                    values.set_bit(pin, level);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn capture(&self, values: &mut Values) {
+        for (generator, pins) in &self.channels {
+            values.set_s32(pins.counts, generator.count() as i32);
+            values.set_float(pins.position_fb, generator.position_of(generator.count()));
+            let delay = nanoseconds(generator.report().max_delay, self.timer_period_ns);
+            values.set_u32(pins.max_delay, delay);
+        }
+    }
+}
+
+fn nanoseconds(ticks: u64, timer_period_ns: u64) -> u32 {
+    u32::try_from(ticks.saturating_mul(timer_period_ns)).unwrap_or(u32::MAX)
+}
+
+impl Component for Stepgen {
+    fn name(&self) -> &'static str {
+        "stepgen"
+    }
+
+    fn run(&mut self, function: usize, values: &mut Values, tick: &Tick<'_>) -> Result<(), Fault> {
+        match function {
+            1 => self.update(values, tick)?,
+            2 => self.capture(values),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Component> {
+        Box::new(self.clone())
+    }
+}

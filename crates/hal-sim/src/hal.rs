@@ -1,0 +1,672 @@
+//! The HAL: named pins, signals, parameters and functions, and threads that run the functions at fixed periods.
+//!
+//! Rules, as in LinuxCNC: names have at most 41 characters; a signal has one type and at most one writer (or any
+//! number of in/out pins); a pin is linked to one signal at most; a function is on one thread at most; threads are made
+//! in order of their periods, and each period is a multiple of the first. Departures: names of pins, parameters,
+//! functions, components and threads are lower case; every period is exact, none is rounded.
+//!
+//! Units at the pins: mm and **degrees**, as in LinuxCNC.
+
+use crate::component::{Component, Fault, Setpoint, Tick};
+use crate::values::{BitPin, FloatPin, PinType, S32Pin, U32Pin, Value, Values};
+use pkm_stepgen::{Period, TimingError};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Longest name, in characters.
+pub const MAX_NAME: usize = 41;
+
+/// Which way data flows through a pin, seen from its component.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// A pin that reads.
+    In,
+    /// A pin that writes.
+    Out,
+    /// A pin that does both.
+    InOut,
+    /// A parameter that may be set.
+    Parameter,
+    /// A parameter that only the component writes.
+    ReadOnly,
+}
+
+/// Why the HAL refuses. Names are as the caller gave them.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+#[allow(missing_docs)]
+pub enum HalError {
+    /// Longer than [`MAX_NAME`], empty, or with a character that names do not have.
+    BadName { name: String },
+    /// The name is taken.
+    Taken { name: String },
+    /// Nothing has this name; `what` says what was looked for.
+    Unknown { what: &'static str, name: String },
+    /// Two types that do not match.
+    WrongType { name: String, expected: PinType, found: PinType },
+    /// A second writer for a signal.
+    SecondWriter { signal: String, writer: String, pin: String },
+    /// The pin is linked to another signal.
+    Linked { pin: String, signal: String },
+    /// The value cannot be set from outside: an output, a read-only parameter, a signal with a writer.
+    NotSettable { name: String },
+    /// The value is NaN or infinite.
+    NotFinite { name: String },
+    /// A function is on a thread already.
+    FunctionInUse { function: String, thread: String },
+    /// Thread period 0, shorter than the first thread's or not a multiple of it.
+    ThreadPeriod { thread: String, period_ns: u64, base_period_ns: u64 },
+    /// A period and the timer do not go together.
+    Timing(TimingError),
+}
+
+impl fmt::Display for HalError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::BadName { name } => write!(
+                f,
+                "'{name}' is not a name: 1 to {MAX_NAME} characters of a-z, 0-9, '.', '-' (signals also A-Z, '_')"
+            ),
+            Self::Taken { name } => write!(f, "the name '{name}' is taken"),
+            Self::Unknown { what, name } => write!(f, "there is no {what} '{name}'"),
+            Self::WrongType { name, expected, found } => {
+                write!(f, "'{name}' is of type {expected}, not {found}")
+            }
+            Self::SecondWriter { signal, writer, pin } => {
+                write!(f, "signal '{signal}' is written by '{writer}' already; '{pin}' cannot write it too")
+            }
+            Self::Linked { pin, signal } => write!(f, "pin '{pin}' is linked to signal '{signal}' already"),
+            Self::NotSettable { name } => write!(f, "'{name}' cannot be set: something else writes it"),
+            Self::NotFinite { name } => write!(f, "'{name}' can only be set to a finite number"),
+            Self::FunctionInUse { function, thread } => {
+                write!(f, "function '{function}' is on thread '{thread}' already")
+            }
+            Self::ThreadPeriod { thread, period_ns, base_period_ns } => write!(
+                f,
+                "the period of thread '{thread}', {period_ns} ns, is not a multiple of the first thread's, {base_period_ns} ns"
+            ),
+            Self::Timing(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for HalError {}
+
+impl From<TimingError> for HalError {
+    fn from(error: TimingError) -> Self {
+        Self::Timing(error)
+    }
+}
+
+/// A pin or parameter as `show` lists it.
+#[derive(Debug, Clone)]
+struct PinRecord {
+    pin_type: PinType,
+    role: Role,
+    /// Index among the pins of its type.
+    index: u32,
+    /// Its own cell, where it points while it is not linked.
+    own_cell: u32,
+    signal: Option<String>,
+    owner: &'static str,
+}
+
+#[derive(Debug, Clone)]
+struct SignalRecord {
+    pin_type: PinType,
+    cell: u32,
+    /// Names of the linked pins, in order of linking.
+    pins: Vec<String>,
+}
+
+#[derive(Debug, Clone)]
+struct FunctionRecord {
+    component: usize,
+    function: usize,
+    thread: Option<String>,
+}
+
+/// A thread: functions in order, at a fixed period.
+#[derive(Debug, Clone)]
+struct Thread {
+    name: String,
+    period_ns: u64,
+    /// Period in base periods, ≥ 1.
+    every: u64,
+    period: Period,
+    ticks: u64,
+    /// (component, function)
+    run: Vec<(usize, usize)>,
+    names: Vec<String>,
+}
+
+/// The HAL. `Clone` copies everything, state of the components included.
+#[derive(Clone)]
+pub struct Hal {
+    timer_period_ns: u64,
+    values: Values,
+    pins: BTreeMap<String, PinRecord>,
+    signals: BTreeMap<String, SignalRecord>,
+    functions: BTreeMap<String, FunctionRecord>,
+    components: Vec<Box<dyn Component>>,
+    threads: Vec<Thread>,
+    base_ticks: u64,
+}
+
+fn check_name(name: &str, signal: bool) -> Result<(), HalError> {
+    let good =
+        |c: char| matches!(c, 'a'..='z' | '0'..='9' | '.' | '-') || (signal && matches!(c, 'A'..='Z' | '_'));
+    if name.is_empty() || name.len() > MAX_NAME || !name.chars().all(good) {
+        return Err(HalError::BadName { name: name.to_owned() });
+    }
+    Ok(())
+}
+
+fn unknown(what: &'static str, name: &str) -> HalError {
+    HalError::Unknown { what, name: name.to_owned() }
+}
+
+impl Hal {
+    /// An empty HAL whose edges have time stamps in units of `timer_period_ns`.
+    ///
+    /// # Errors
+    /// `Timing` if it is 0.
+    pub fn new(timer_period_ns: u64) -> Result<Self, HalError> {
+        if timer_period_ns == 0 {
+            return Err(TimingError::ZeroTimerPeriod.into());
+        }
+        Ok(Self {
+            timer_period_ns,
+            values: Values::default(),
+            pins: BTreeMap::new(),
+            signals: BTreeMap::new(),
+            functions: BTreeMap::new(),
+            components: Vec::new(),
+            threads: Vec::new(),
+            base_ticks: 0,
+        })
+    }
+
+    /// The unit of edge times, ns.
+    pub const fn timer_period_ns(&self) -> u64 {
+        self.timer_period_ns
+    }
+
+    /// The values, for reading and writing by pin.
+    pub const fn values(&self) -> &Values {
+        &self.values
+    }
+
+    /// The values, for reading and writing by pin.
+    pub const fn values_mut(&mut self) -> &mut Values {
+        &mut self.values
+    }
+
+    // ---- pins and parameters
+
+    fn new_pin(
+        &mut self,
+        owner: &'static str,
+        name: &str,
+        role: Role,
+        value: Value,
+    ) -> Result<u32, HalError> {
+        check_name(name, false)?;
+        if self.pins.contains_key(name) {
+            return Err(HalError::Taken { name: name.to_owned() });
+        }
+        let values = &mut self.values;
+        let index = match value {
+            Value::Bit(value) => {
+                let index = values.bits.pin(value);
+                values.edges.resize_with(values.bits.cells.len(), Default::default);
+                index
+            }
+            Value::Float(value) => values.floats.pin(value),
+            Value::S32(value) => values.s32s.pin(value),
+            Value::U32(value) => values.u32s.pin(value),
+        };
+        let own_cell = self.pin_cells(value.pin_type())[index as usize];
+        let record = PinRecord { pin_type: value.pin_type(), role, index, own_cell, signal: None, owner };
+        self.pins.insert(name.to_owned(), record);
+        Ok(index)
+    }
+
+    fn pin_cells(&mut self, pin_type: PinType) -> &mut Vec<u32> {
+        match pin_type {
+            PinType::Bit => &mut self.values.bits.pins,
+            PinType::Float => &mut self.values.floats.pins,
+            PinType::S32 => &mut self.values.s32s.pins,
+            PinType::U32 => &mut self.values.u32s.pins,
+        }
+    }
+
+    fn cell(&self, pin_type: PinType, cell: u32) -> Value {
+        let cell = cell as usize;
+        match pin_type {
+            PinType::Bit => Value::Bit(self.values.bits.cells[cell]),
+            PinType::Float => Value::Float(self.values.floats.cells[cell]),
+            PinType::S32 => Value::S32(self.values.s32s.cells[cell]),
+            PinType::U32 => Value::U32(self.values.u32s.cells[cell]),
+        }
+    }
+
+    fn set_cell(&mut self, cell: u32, value: Value) {
+        let cell = cell as usize;
+        match value {
+            Value::Bit(value) => self.values.bits.cells[cell] = value,
+            Value::Float(value) => self.values.floats.cells[cell] = value,
+            Value::S32(value) => self.values.s32s.cells[cell] = value,
+            Value::U32(value) => self.values.u32s.cells[cell] = value,
+        }
+    }
+
+    /// A new bit pin or parameter.
+    ///
+    /// # Errors
+    /// `BadName`, `Taken`.
+    pub fn new_bit(
+        &mut self,
+        owner: &'static str,
+        name: &str,
+        role: Role,
+        value: bool,
+    ) -> Result<BitPin, HalError> {
+        self.new_pin(owner, name, role, Value::Bit(value)).map(BitPin)
+    }
+
+    /// A new float pin or parameter.
+    ///
+    /// # Errors
+    /// `BadName`, `Taken`.
+    pub fn new_float(
+        &mut self,
+        owner: &'static str,
+        name: &str,
+        role: Role,
+        value: f64,
+    ) -> Result<FloatPin, HalError> {
+        self.new_pin(owner, name, role, Value::Float(value)).map(FloatPin)
+    }
+
+    /// A new signed integer pin or parameter.
+    ///
+    /// # Errors
+    /// `BadName`, `Taken`.
+    pub fn new_s32(
+        &mut self,
+        owner: &'static str,
+        name: &str,
+        role: Role,
+        value: i32,
+    ) -> Result<S32Pin, HalError> {
+        self.new_pin(owner, name, role, Value::S32(value)).map(S32Pin)
+    }
+
+    /// A new unsigned integer pin or parameter.
+    ///
+    /// # Errors
+    /// `BadName`, `Taken`.
+    pub fn new_u32(
+        &mut self,
+        owner: &'static str,
+        name: &str,
+        role: Role,
+        value: u32,
+    ) -> Result<U32Pin, HalError> {
+        self.new_pin(owner, name, role, Value::U32(value)).map(U32Pin)
+    }
+
+    /// Value of a pin or parameter (`getp`).
+    ///
+    /// # Errors
+    /// `Unknown`.
+    pub fn getp(&self, name: &str) -> Result<Value, HalError> {
+        let pin = self.pins.get(name).ok_or_else(|| unknown("pin or parameter", name))?;
+        let cell = match &pin.signal {
+            Some(signal) => self.signals[signal].cell,
+            None => pin.own_cell,
+        };
+        Ok(self.cell(pin.pin_type, cell))
+    }
+
+    /// Sets a parameter, or an input pin that is not linked (`setp`).
+    ///
+    /// # Errors
+    /// `Unknown`, `WrongType`, `NotSettable`, `NotFinite`.
+    pub fn setp(&mut self, name: &str, value: Value) -> Result<(), HalError> {
+        let pin = self.pins.get(name).ok_or_else(|| unknown("pin or parameter", name))?;
+        if matches!(pin.role, Role::Out | Role::ReadOnly) || pin.signal.is_some() {
+            return Err(HalError::NotSettable { name: name.to_owned() });
+        }
+        check_value(name, pin.pin_type, value)?;
+        self.set_cell(pin.own_cell, value);
+        Ok(())
+    }
+
+    /// Type of a pin or parameter.
+    ///
+    /// # Errors
+    /// `Unknown`.
+    pub fn pin_type(&self, name: &str) -> Result<PinType, HalError> {
+        self.pins.get(name).map(|pin| pin.pin_type).ok_or_else(|| unknown("pin or parameter", name))
+    }
+
+    fn pin_index(&self, name: &str, expected: PinType) -> Result<u32, HalError> {
+        let pin = self.pins.get(name).ok_or_else(|| unknown("pin or parameter", name))?;
+        if pin.pin_type != expected {
+            return Err(HalError::WrongType {
+                name: name.to_owned(),
+                expected: pin.pin_type,
+                found: expected,
+            });
+        }
+        Ok(pin.index)
+    }
+
+    /// A bit pin by name, to read it fast.
+    ///
+    /// # Errors
+    /// `Unknown`, `WrongType`.
+    pub fn bit_pin(&self, name: &str) -> Result<BitPin, HalError> {
+        self.pin_index(name, PinType::Bit).map(BitPin)
+    }
+
+    /// A float pin by name, to read it fast.
+    ///
+    /// # Errors
+    /// `Unknown`, `WrongType`.
+    pub fn float_pin(&self, name: &str) -> Result<FloatPin, HalError> {
+        self.pin_index(name, PinType::Float).map(FloatPin)
+    }
+
+    /// All pins and parameters by name: type, role, value, signal.
+    pub fn pins(&self) -> impl Iterator<Item = (&str, PinType, Role, Value, Option<&str>, &'static str)> {
+        self.pins.iter().map(|(name, pin)| {
+            let cell = pin.signal.as_ref().map_or(pin.own_cell, |signal| self.signals[signal].cell);
+            let value = self.cell(pin.pin_type, cell);
+            (name.as_str(), pin.pin_type, pin.role, value, pin.signal.as_deref(), pin.owner)
+        })
+    }
+
+    // ---- signals
+
+    /// A new signal.
+    ///
+    /// # Errors
+    /// `BadName`, `Taken`.
+    pub fn new_signal(&mut self, name: &str, pin_type: PinType) -> Result<(), HalError> {
+        check_name(name, true)?;
+        if self.signals.contains_key(name) {
+            return Err(HalError::Taken { name: name.to_owned() });
+        }
+        let values = &mut self.values;
+        let cell = match pin_type {
+            PinType::Bit => {
+                let cell = values.bits.cell(false);
+                values.edges.resize_with(values.bits.cells.len(), Default::default);
+                cell
+            }
+            PinType::Float => values.floats.cell(0.0),
+            PinType::S32 => values.s32s.cell(0),
+            PinType::U32 => values.u32s.cell(0),
+        };
+        self.signals.insert(name.to_owned(), SignalRecord { pin_type, cell, pins: Vec::new() });
+        Ok(())
+    }
+
+    /// Links a pin to a signal. The first pin gives the signal its value. Linking twice to the same signal is no change.
+    ///
+    /// # Errors
+    /// `Unknown`, `WrongType`, `Linked`, `SecondWriter`; a parameter is no pin.
+    pub fn link(&mut self, pin_name: &str, signal_name: &str) -> Result<(), HalError> {
+        let pin = self.pins.get(pin_name).ok_or_else(|| unknown("pin", pin_name))?.clone();
+        let signal = self.signals.get(signal_name).ok_or_else(|| unknown("signal", signal_name))?;
+        if matches!(pin.role, Role::Parameter | Role::ReadOnly) {
+            return Err(unknown("pin", pin_name));
+        }
+        match &pin.signal {
+            Some(linked) if linked == signal_name => return Ok(()),
+            Some(linked) => {
+                return Err(HalError::Linked { pin: pin_name.to_owned(), signal: linked.clone() });
+            }
+            None => {}
+        }
+        if pin.pin_type != signal.pin_type {
+            return Err(HalError::WrongType {
+                name: signal_name.to_owned(),
+                expected: signal.pin_type,
+                found: pin.pin_type,
+            });
+        }
+        let clashes = |other: &&String| {
+            matches!(
+                (pin.role, self.pins[*other].role),
+                (Role::Out, Role::Out | Role::InOut) | (Role::InOut, Role::Out)
+            )
+        };
+        if let Some(writer) = signal.pins.iter().find(clashes) {
+            return Err(HalError::SecondWriter {
+                signal: signal_name.to_owned(),
+                writer: writer.clone(),
+                pin: pin_name.to_owned(),
+            });
+        }
+        let (cell, first) = (signal.cell, signal.pins.is_empty());
+        if first || pin.role == Role::Out {
+            self.set_cell(cell, self.cell(pin.pin_type, pin.own_cell));
+        }
+        self.pin_cells(pin.pin_type)[pin.index as usize] = cell;
+        if let Some(record) = self.pins.get_mut(pin_name) {
+            record.signal = Some(signal_name.to_owned());
+        }
+        if let Some(record) = self.signals.get_mut(signal_name) {
+            record.pins.push(pin_name.to_owned());
+        }
+        Ok(())
+    }
+
+    /// Takes a pin off its signal; it keeps the signal's value.
+    ///
+    /// # Errors
+    /// `Unknown`.
+    pub fn unlink(&mut self, pin_name: &str) -> Result<(), HalError> {
+        let value = self.getp(pin_name)?;
+        let pin = self.pins.get_mut(pin_name).ok_or_else(|| unknown("pin", pin_name))?;
+        let (pin_type, index, own_cell) = (pin.pin_type, pin.index, pin.own_cell);
+        if let Some(signal) = pin.signal.take().and_then(|name| self.signals.get_mut(&name)) {
+            signal.pins.retain(|name| name != pin_name);
+            self.set_cell(own_cell, value);
+            self.pin_cells(pin_type)[index as usize] = own_cell;
+        }
+        Ok(())
+    }
+
+    /// Makes the signal if it does not exist (with the type of the first pin) and links the pins to it. All or nothing.
+    ///
+    /// # Errors
+    /// As [`Self::link`].
+    pub fn net(&mut self, signal_name: &str, pin_names: &[&str]) -> Result<(), HalError> {
+        let existed = self.signals.contains_key(signal_name);
+        if !existed {
+            let first = pin_names.first().ok_or_else(|| unknown("signal", signal_name))?;
+            let pin_type = self.pins.get(*first).ok_or_else(|| unknown("pin", first))?.pin_type;
+            self.new_signal(signal_name, pin_type)?;
+        }
+        let mut linked = Vec::new();
+        for pin in pin_names {
+            let fresh = self.pins.get(*pin).is_some_and(|record| record.signal.is_none());
+            if let Err(error) = self.link(pin, signal_name) {
+                for pin in linked {
+                    self.unlink(pin)?;
+                }
+                if !existed {
+                    self.signals.remove(signal_name);
+                }
+                return Err(error);
+            }
+            if fresh {
+                linked.push(pin);
+            }
+        }
+        Ok(())
+    }
+
+    /// Value of a signal (`gets`).
+    ///
+    /// # Errors
+    /// `Unknown`.
+    pub fn gets(&self, name: &str) -> Result<Value, HalError> {
+        let signal = self.signals.get(name).ok_or_else(|| unknown("signal", name))?;
+        Ok(self.cell(signal.pin_type, signal.cell))
+    }
+
+    /// Sets a signal that has no writer (`sets`).
+    ///
+    /// # Errors
+    /// `Unknown`, `WrongType`, `NotSettable`, `NotFinite`.
+    pub fn sets(&mut self, name: &str, value: Value) -> Result<(), HalError> {
+        let signal = self.signals.get(name).ok_or_else(|| unknown("signal", name))?;
+        if signal.pins.iter().any(|pin| self.pins[pin].role == Role::Out) {
+            return Err(HalError::NotSettable { name: name.to_owned() });
+        }
+        check_value(name, signal.pin_type, value)?;
+        self.set_cell(signal.cell, value);
+        Ok(())
+    }
+
+    /// All signals by name: type, value, linked pins in order of linking with their roles.
+    pub fn signals(&self) -> impl Iterator<Item = (&str, PinType, Value, Vec<(&str, Role)>)> {
+        self.signals.iter().map(|(name, signal)| {
+            let pins = signal.pins.iter().map(|pin| (pin.as_str(), self.pins[pin].role)).collect();
+            (name.as_str(), signal.pin_type, self.cell(signal.pin_type, signal.cell), pins)
+        })
+    }
+
+    // ---- components, functions, threads
+
+    /// Adds a component whose pins exist, with the names of its functions in the order of their numbers.
+    ///
+    /// # Errors
+    /// `BadName`, `Taken`.
+    pub fn add_component(
+        &mut self,
+        component: Box<dyn Component>,
+        functions: &[String],
+    ) -> Result<(), HalError> {
+        for name in functions {
+            check_name(name, false)?;
+            if self.functions.contains_key(name) {
+                return Err(HalError::Taken { name: name.clone() });
+            }
+        }
+        let component_index = self.components.len();
+        for (function, name) in functions.iter().enumerate() {
+            let record = FunctionRecord { component: component_index, function, thread: None };
+            self.functions.insert(name.clone(), record);
+        }
+        self.components.push(component);
+        Ok(())
+    }
+
+    /// A new thread; the first one made sets the base period.
+    ///
+    /// # Errors
+    /// `BadName`, `Taken`, `ThreadPeriod`, `Timing`.
+    pub fn new_thread(&mut self, name: &str, period_ns: u64) -> Result<(), HalError> {
+        check_name(name, false)?;
+        if self.threads.iter().any(|thread| thread.name == name) {
+            return Err(HalError::Taken { name: name.to_owned() });
+        }
+        let base_period_ns = self.threads.first().map_or(period_ns, |thread| thread.period_ns);
+        let last_period_ns = self.threads.last().map_or(0, |thread| thread.period_ns);
+        if period_ns == 0 || period_ns < last_period_ns || !period_ns.is_multiple_of(base_period_ns) {
+            return Err(HalError::ThreadPeriod { thread: name.to_owned(), period_ns, base_period_ns });
+        }
+        self.threads.push(Thread {
+            name: name.to_owned(),
+            period_ns,
+            every: period_ns / base_period_ns,
+            period: Period::new(0, period_ns, self.timer_period_ns)?,
+            ticks: 0,
+            run: Vec::new(),
+            names: Vec::new(),
+        });
+        Ok(())
+    }
+
+    /// Appends a function to a thread (`addf`).
+    ///
+    /// # Errors
+    /// `Unknown`, `FunctionInUse`.
+    pub fn addf(&mut self, function_name: &str, thread_name: &str) -> Result<(), HalError> {
+        let thread = self
+            .threads
+            .iter_mut()
+            .find(|thread| thread.name == thread_name)
+            .ok_or_else(|| unknown("thread", thread_name))?;
+        let function =
+            self.functions.get_mut(function_name).ok_or_else(|| unknown("function", function_name))?;
+        if let Some(thread) = &function.thread {
+            return Err(HalError::FunctionInUse {
+                function: function_name.to_owned(),
+                thread: thread.clone(),
+            });
+        }
+        function.thread = Some(thread_name.to_owned());
+        thread.run.push((function.component, function.function));
+        thread.names.push(function_name.to_owned());
+        Ok(())
+    }
+
+    /// All functions by name, with their thread.
+    pub fn functions(&self) -> impl Iterator<Item = (&str, Option<&str>)> {
+        self.functions.iter().map(|(name, function)| (name.as_str(), function.thread.as_deref()))
+    }
+
+    /// All threads: name, period in ns, functions in order.
+    pub fn threads(&self) -> impl Iterator<Item = (&str, u64, &[String])> {
+        self.threads.iter().map(|thread| (thread.name.as_str(), thread.period_ns, thread.names.as_slice()))
+    }
+
+    /// Names of the components in order of loading.
+    pub fn components(&self) -> impl Iterator<Item = &'static str> {
+        self.components.iter().map(|component| component.name())
+    }
+
+    /// A component by its place in order of loading.
+    pub(crate) fn component(&self, index: usize) -> Option<&dyn Component> {
+        self.components.get(index).map(AsRef::as_ref)
+    }
+
+    /// Runs one period of the first thread, and of each slower thread that is due; faster threads first.
+    ///
+    /// # Errors
+    /// The first [`Fault`] of a component; the functions after it do not run.
+    pub fn run(&mut self, setpoint: Option<&Setpoint>) -> Result<(), Fault> {
+        let Self { threads, components, values, base_ticks, .. } = self;
+        for thread in threads {
+            if *base_ticks % thread.every != 0 {
+                continue;
+            }
+            thread.ticks += 1;
+            let tick = Tick { number: thread.ticks, period: thread.period, setpoint };
+            for &(component, function) in &thread.run {
+                components[component].run(function, values, &tick)?;
+            }
+            thread.period = thread.period.next();
+        }
+        *base_ticks += 1;
+        Ok(())
+    }
+}
+
+fn check_value(name: &str, expected: PinType, value: Value) -> Result<(), HalError> {
+    if value.pin_type() != expected {
+        return Err(HalError::WrongType { name: name.to_owned(), expected, found: value.pin_type() });
+    }
+    match value {
+        Value::Float(number) if !number.is_finite() => Err(HalError::NotFinite { name: name.to_owned() }),
+        _ => Ok(()),
+    }
+}

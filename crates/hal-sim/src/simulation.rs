@@ -1,0 +1,535 @@
+//! The machine ready-wired: motion → stepgen → driver → motor on one servo thread, judged while it runs.
+//!
+//! Everything goes through the HAL's pins; [`Simulation::hal`] shows them. What is *reported* comes from the edges: the
+//! simulation counts them itself, apart from generator and driver.
+
+use crate::component::{Fault, Setpoint, SetpointSource};
+use crate::components::driver::{Driver, DriverChannel, Drivers, Violations};
+use crate::components::motion::{Motion, MotionJoint};
+use crate::components::motor::{MotorChannel, Motors};
+use crate::components::stepgen::{Stepgen, StepgenChannel, StepgenError};
+use crate::hal::{Hal, HalError};
+use crate::values::{BitPin, FloatPin};
+use pkm_kins::maths::{PI, radians};
+use pkm_kins::{AxisSet, ForwardError, JointKind, JointRange, Joints, Kinematics, MAX_JOINTS, Pose};
+use pkm_stepgen::{Edge, EdgeError, Line, Period, PulseTimingNs, StepGenerator};
+use std::any::Any;
+use std::fmt;
+
+/// One joint of the machine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointConfig {
+    /// For people.
+    pub name: String,
+    /// Length or angle.
+    pub kind: JointKind,
+    /// Steps per mm or rad, not 0; negative turns the motor the other way round.
+    pub steps_per_unit: f64,
+    /// Times of the pulses as configured.
+    pub timing: PulseTimingNs,
+    /// The driver's minima by its data sheet: step high, step low, direction setup and hold.
+    pub driver_minimum: PulseTimingNs,
+    /// Travel, mm or rad.
+    pub range: JointRange,
+    /// Where it stands at the start, mm or rad.
+    pub start: f64,
+}
+
+/// The machine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SimulationConfig {
+    /// In joint order, 1 to [`MAX_JOINTS`].
+    pub joints: Vec<JointConfig>,
+    /// The coordinates it has.
+    pub axes: AxisSet,
+    /// Its pose at the start, mm and rad.
+    pub start: Pose,
+    /// ns, a multiple of the timer's period.
+    pub servo_period_ns: u64,
+    /// Unit of all edge times, ns.
+    pub timer_period_ns: u64,
+}
+
+/// Why a machine cannot be wired.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ConfigError {
+    /// No joint, or more than [`MAX_JOINTS`].
+    JointCount(usize),
+    /// A joint's scale or start is not finite, the scale is 0, or the start is beyond 2³² steps.
+    Joint {
+        /// Counted from 0.
+        joint: usize,
+        /// Why.
+        error: EdgeError,
+    },
+    /// Periods, pulse times.
+    Hal(HalError),
+}
+
+impl From<HalError> for ConfigError {
+    fn from(error: HalError) -> Self {
+        Self::Hal(error)
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::JointCount(count) => write!(f, "{count} joints; a machine has 1 to {MAX_JOINTS}"),
+            Self::Joint { joint, error } => write!(f, "joint {joint}, scale or start: {error}"),
+            Self::Hal(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for ConfigError {}
+
+/// Why a period did not run to its end. The machine must not be driven on after it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum TickError<E> {
+    /// The source has no setpoint.
+    Source(E),
+    /// A component refused.
+    Fault(Fault),
+}
+
+impl<E: fmt::Display> fmt::Display for TickError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Source(error) => error.fmt(f),
+            Self::Fault(fault) => fault.fmt(f),
+        }
+    }
+}
+
+impl<E: fmt::Debug + fmt::Display> std::error::Error for TickError<E> {}
+
+/// A joint at the end of a period.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JointState {
+    /// Commanded, mm or rad.
+    pub commanded: f64,
+    /// Counted from the edges, mm or rad.
+    pub position: f64,
+    /// Counted from the edges, steps; 0 is the joint's zero.
+    pub count: i64,
+    /// `count` less the commanded position, steps.
+    pub step_error: f64,
+}
+
+/// The machine at the end of a period.
+#[derive(Debug, Clone, Copy)]
+pub struct TickReport<'a> {
+    /// Number of the period; 0 is the start.
+    pub tick: u64,
+    /// tick × servo period.
+    pub time_ns: u64,
+    /// What was commanded for this time.
+    pub setpoint: &'a Setpoint,
+    /// In joint order.
+    pub joints: &'a [JointState],
+}
+
+/// Sees everything that the machine does: for each period first its edges in order of time, then the report.
+pub trait Observer {
+    /// False: edges are not wanted, and need not be brought in order.
+    fn wants_edges(&self) -> bool {
+        true
+    }
+
+    /// An edge on one of the lines to the drivers.
+    fn edge(&mut self, edge: &Edge);
+
+    /// The end of a period.
+    fn tick(&mut self, report: &TickReport<'_>);
+}
+
+/// What a joint did so far.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JointStatistics {
+    /// Steps in either direction.
+    pub steps: u64,
+    /// Changes of the direction line.
+    pub reversals: u64,
+    /// Shortest time between two steps, ns; None before the second step.
+    pub min_pulse_interval_ns: Option<u64>,
+    /// Largest |count − commanded| at the ends of periods, steps.
+    pub max_step_error: f64,
+    /// Largest |count − commanded| just before and after each step, steps.
+    pub max_edge_error: f64,
+    /// Steps that came later than wanted, for the driver's timing.
+    pub delayed_steps: u64,
+    /// The largest such delay, ns.
+    pub max_delay_ns: u64,
+    /// Times shorter than the driver's data sheet allows.
+    pub violations: Violations,
+    /// Lowest position counted from the edges at the ends of periods, mm or rad.
+    pub min_position: f64,
+    /// Highest such position, mm or rad.
+    pub max_position: f64,
+}
+
+/// Where the joint's lines stand as the simulation has seen them.
+#[derive(Debug, Clone)]
+struct Lines {
+    step: BitPin,
+    dir: BitPin,
+    step_cursor: u64,
+    dir_cursor: u64,
+    positive: bool,
+    kind: JointKind,
+    steps_per_unit: f64,
+    motor_position: FloatPin,
+}
+
+/// Places of the components in the HAL, in order of loading.
+const STEPGEN: usize = 1;
+const DRIVER: usize = 2;
+const THREAD: &str = "servo-thread";
+
+/// The simulated machine. `Clone` forks it.
+#[derive(Clone)]
+pub struct Simulation {
+    hal: Hal,
+    lines: Vec<Lines>,
+    states: Vec<JointState>,
+    statistics: Vec<JointStatistics>,
+    setpoint: Setpoint,
+    period: Period,
+    servo_period_ns: u64,
+    axes: AxisSet,
+    tick: u64,
+    /// Edges of the period in order of time, per joint and of all.
+    joint_edges: Vec<Vec<Edge>>,
+}
+
+impl Simulation {
+    /// Wires the machine; it stands at its start, lines low.
+    ///
+    /// # Errors
+    /// See [`ConfigError`].
+    pub fn new(config: &SimulationConfig) -> Result<Self, ConfigError> {
+        let count = config.joints.len();
+        if count == 0 || count > MAX_JOINTS {
+            return Err(ConfigError::JointCount(count));
+        }
+        let mut hal = Hal::new(config.timer_period_ns)?;
+        hal.new_thread(THREAD, config.servo_period_ns)?;
+        let period =
+            Period::new(0, config.servo_period_ns, config.timer_period_ns).map_err(HalError::from)?;
+
+        let mut setpoint = Setpoint { pose: config.start, in_position: true, ..Setpoint::default() };
+        let (mut motion, mut stepgen, mut drivers, mut motors) = (vec![], vec![], vec![], vec![]);
+        for (n, joint) in config.joints.iter().enumerate() {
+            setpoint.joints[n] = joint.start;
+            let ticks = joint.timing.ticks(config.timer_period_ns).map_err(HalError::from)?;
+            let at_start = StepGenerator::new(n as u8, joint.steps_per_unit, ticks, joint.start)
+                .map_err(|error| ConfigError::Joint { joint: n, error })?;
+            motion.push(MotionJoint {
+                kind: joint.kind,
+                range: joint.range,
+                start: joint.start,
+                step: 1.0 / joint.steps_per_unit,
+                max_steps: ticks.max_steps(&period),
+            });
+            let scale = shown_scale(joint.kind, joint.steps_per_unit);
+            let start = joint.start * (joint.steps_per_unit / scale);
+            stepgen.push(StepgenChannel { position_scale: scale, timing: joint.timing, start });
+            let start = at_start.count();
+            drivers.push(DriverChannel { minimum: joint.driver_minimum, start });
+            motors.push(MotorChannel { scale, start });
+        }
+        Motion::load(&mut hal, &motion, config.axes)?;
+        Stepgen::load(&mut hal, &stepgen).map_err(|error| match error {
+            StepgenError::Hal(error) => ConfigError::Hal(error),
+            StepgenError::Channel(joint, error) => ConfigError::Joint { joint, error },
+        })?;
+        Drivers::load(&mut hal, &drivers)?;
+        Motors::load(&mut hal, &motors)?;
+        wire(&mut hal, count)?;
+
+        let mut simulation = Self {
+            lines: lines(&hal, config)?,
+            hal,
+            states: vec![JointState::default(); count],
+            statistics: vec![JointStatistics::default(); count],
+            setpoint,
+            period,
+            servo_period_ns: config.servo_period_ns,
+            axes: config.axes,
+            tick: 0,
+            joint_edges: vec![Vec::new(); count],
+        };
+        simulation.start(&drivers);
+        Ok(simulation)
+    }
+
+    fn start(&mut self, drivers: &[DriverChannel]) {
+        for (n, driver) in drivers.iter().enumerate() {
+            let position = driver.start as f64 / self.lines[n].steps_per_unit;
+            let commanded = self.setpoint.joints[n];
+            let offset = self.generators().nth(n).map_or(0.0, |generator| generator.offset(driver.start));
+            self.states[n] = JointState { commanded, position, count: driver.start, step_error: -offset };
+            let statistics = &mut self.statistics[n];
+            (statistics.min_position, statistics.max_position) = (position, position);
+        }
+    }
+
+    /// Runs one servo period with the next setpoint of `source`.
+    ///
+    /// # Errors
+    /// `Source`: nothing has run. `Fault`: the HAL stands; do not go on.
+    pub fn tick<S: SetpointSource + ?Sized>(
+        &mut self,
+        source: &mut S,
+        observers: &mut [&mut dyn Observer],
+    ) -> Result<TickReport<'_>, TickError<S::Error>> {
+        let setpoint = source.next(self.tick + 1).map_err(TickError::Source)?;
+        self.tick_to(&setpoint, observers).map_err(TickError::Fault)
+    }
+
+    /// Runs one servo period to a given setpoint.
+    ///
+    /// # Errors
+    /// The fault of a component: the HAL stands; do not go on.
+    pub fn tick_to(
+        &mut self,
+        setpoint: &Setpoint,
+        observers: &mut [&mut dyn Observer],
+    ) -> Result<TickReport<'_>, Fault> {
+        self.hal.run(Some(setpoint))?;
+        self.setpoint = *setpoint;
+        self.tick += 1;
+        let ordered = observers.iter().any(|observer| observer.wants_edges());
+        self.judge(ordered);
+        if ordered {
+            self.deliver(observers);
+        }
+        self.period = self.period.next();
+        let report = TickReport {
+            tick: self.tick,
+            time_ns: self.tick * self.servo_period_ns,
+            setpoint: &self.setpoint,
+            joints: &self.states,
+        };
+        for observer in observers {
+            observer.tick(&report);
+        }
+        Ok(report)
+    }
+
+    /// Counts the edges of the period and compares them with the command.
+    fn judge(&mut self, collect: bool) {
+        let Self { hal, lines, states, statistics, setpoint, period, joint_edges, .. } = self;
+        let stepgen = part::<Stepgen>(hal, STEPGEN);
+        let per_tick = 1.0 / f64::from(period.ticks());
+        for (n, (line, generator)) in lines.iter_mut().zip(stepgen.generators()).enumerate() {
+            let (state, statistics) = (&mut states[n], &mut statistics[n]);
+            let steps = hal.values().edges(line.step).read(&mut line.step_cursor, period.end());
+            let turns = hal.values().edges(line.dir).read(&mut line.dir_cursor, period.end());
+            joint_edges[n].clear();
+            let mut turns = turns.iter().peekable();
+            let cubic = generator.cubic();
+            for step in steps {
+                while let Some(turn) = turns.next_if(|turn| turn.time <= step.time) {
+                    line.positive = turn.level;
+                    statistics.reversals += 1;
+                    if collect {
+                        joint_edges[n].push(edge(n, Line::Dir, turn));
+                    }
+                }
+                if step.level {
+                    let before = (state.count - cubic.base) as f64;
+                    let after = if line.positive { before + 1.0 } else { before - 1.0 };
+                    state.count += if line.positive { 1 } else { -1 };
+                    statistics.steps += 1;
+                    let at = cubic.at(step.time.saturating_sub(period.start()) as f64 * per_tick);
+                    let error = (before - at).abs().max((after - at).abs());
+                    statistics.max_edge_error = statistics.max_edge_error.max(error);
+                }
+                if collect {
+                    joint_edges[n].push(edge(n, Line::Step, step));
+                }
+            }
+            for turn in turns {
+                line.positive = turn.level;
+                statistics.reversals += 1;
+                if collect {
+                    joint_edges[n].push(edge(n, Line::Dir, turn));
+                }
+            }
+            state.commanded = setpoint.joints[n];
+            state.position = state.count as f64 / line.steps_per_unit;
+            state.step_error = -generator.offset(state.count);
+            statistics.max_step_error = statistics.max_step_error.max(state.step_error.abs());
+            statistics.min_position = statistics.min_position.min(state.position);
+            statistics.max_position = statistics.max_position.max(state.position);
+        }
+    }
+
+    /// Hands the edges of all joints to the observers in order of time; at the same time in joint order.
+    fn deliver(&mut self, observers: &mut [&mut dyn Observer]) {
+        let mut next = [0_usize; MAX_JOINTS];
+        loop {
+            let mut first: Option<(usize, &Edge)> = None;
+            for (n, edges) in self.joint_edges.iter().enumerate() {
+                if let Some(edge) = edges.get(next[n])
+                    && first.is_none_or(|(_, other)| edge.time < other.time)
+                {
+                    first = Some((n, edge));
+                }
+            }
+            let Some((n, edge)) = first else { return };
+            next[n] += 1;
+            for observer in observers.iter_mut().filter(|observer| observer.wants_edges()) {
+                observer.edge(edge);
+            }
+        }
+    }
+
+    /// Number of the last period; 0 before the first.
+    pub const fn tick_number(&self) -> u64 {
+        self.tick
+    }
+
+    /// The machine as it stands.
+    pub fn report(&self) -> TickReport<'_> {
+        TickReport {
+            tick: self.tick,
+            time_ns: self.tick * self.servo_period_ns,
+            setpoint: &self.setpoint,
+            joints: &self.states,
+        }
+    }
+
+    /// Joint positions as the edges have them, mm or rad.
+    pub fn feedback(&self) -> Joints {
+        let mut joints = [0.0; MAX_JOINTS];
+        for (joint, state) in joints.iter_mut().zip(&self.states) {
+            *joint = state.position;
+        }
+        joints
+    }
+
+    /// The pose at which the motors hold the mechanism.
+    ///
+    /// # Errors
+    /// The mechanism's own, if the motors stand where it cannot be.
+    pub fn feedback_pose(&self, kinematics: &impl Kinematics) -> Result<Pose, ForwardError> {
+        let mut joints = [0.0; MAX_JOINTS];
+        for (joint, line) in joints.iter_mut().zip(&self.lines) {
+            let position = self.hal.values().float(line.motor_position);
+            *joint = if line.kind == JointKind::Rotary { radians(position) } else { position };
+        }
+        kinematics.forward(&joints, &self.setpoint.pose)
+    }
+
+    /// What the joints did so far.
+    pub fn statistics(&self) -> Vec<JointStatistics> {
+        let timer_period_ns = self.hal.timer_period_ns();
+        let judged = self.statistics.iter().zip(self.generators()).zip(self.drivers());
+        judged
+            .map(|((statistics, generator), driver)| JointStatistics {
+                min_pulse_interval_ns: driver.min_interval_ns(),
+                delayed_steps: generator.report().delayed_steps,
+                max_delay_ns: generator.report().max_delay.saturating_mul(timer_period_ns),
+                violations: *driver.violations(),
+                ..*statistics
+            })
+            .collect()
+    }
+
+    fn generators(&self) -> impl Iterator<Item = &StepGenerator> {
+        part::<Stepgen>(&self.hal, STEPGEN).generators()
+    }
+
+    fn drivers(&self) -> impl Iterator<Item = &Driver> {
+        part::<Drivers>(&self.hal, DRIVER).drivers()
+    }
+
+    /// The HAL underneath.
+    pub const fn hal(&self) -> &Hal {
+        &self.hal
+    }
+
+    /// The HAL underneath, to set pins or wire more.
+    pub const fn hal_mut(&mut self) -> &mut Hal {
+        &mut self.hal
+    }
+
+    /// The coordinates of the machine.
+    pub const fn axes(&self) -> AxisSet {
+        self.axes
+    }
+
+    /// Length or angle, in joint order.
+    pub fn joint_kinds(&self) -> impl Iterator<Item = JointKind> {
+        self.lines.iter().map(|line| line.kind)
+    }
+
+    /// Servo period, ns.
+    pub const fn servo_period_ns(&self) -> u64 {
+        self.servo_period_ns
+    }
+}
+
+/// Steps per mm, or per degree (HAL pins of rotary joints are in degrees).
+fn shown_scale(kind: JointKind, steps_per_unit: f64) -> f64 {
+    match kind {
+        JointKind::Linear => steps_per_unit,
+        JointKind::Rotary => steps_per_unit * (PI / 180.0),
+    }
+}
+
+/// The component that `Simulation::new` loaded at this place.
+fn part<T: Any>(hal: &Hal, place: usize) -> &T {
+    let component: Option<&dyn Any> = hal.component(place).map(|component| component as &dyn Any);
+    component.and_then(<dyn Any>::downcast_ref).expect("Simulation::new loads the components in this order")
+}
+
+fn edge(joint: usize, line: Line, edge: &crate::values::LineEdge) -> Edge {
+    Edge { time: edge.time, joint: joint as u8, line, level: edge.level }
+}
+
+fn wire(hal: &mut Hal, joints: usize) -> Result<(), HalError> {
+    for n in 0..joints {
+        for (signal, writer, reader) in [
+            ("pos-cmd", "joint.N.motor-pos-cmd", "stepgen.N.position-cmd"),
+            ("vel-cmd", "joint.N.vel-cmd", "stepgen.N.velocity-cmd"),
+            ("step", "stepgen.N.step", "driver.N.step"),
+            ("dir", "stepgen.N.dir", "driver.N.dir"),
+            ("counts", "driver.N.counts", "motor.N.counts"),
+            ("motor-pos", "motor.N.position", "joint.N.motor-pos-fb"),
+        ] {
+            let numbered = |pin: &str| pin.replace('N', &n.to_string());
+            hal.net(&format!("j{n}-{signal}"), &[&numbered(writer), &numbered(reader)])?;
+        }
+    }
+    for function in [
+        "motion-command-handler",
+        "motion-controller",
+        "stepgen.update-freq",
+        "driver.update",
+        "motor.update",
+        "stepgen.capture-position",
+    ] {
+        hal.addf(function, THREAD)?;
+    }
+    Ok(())
+}
+
+fn lines(hal: &Hal, config: &SimulationConfig) -> Result<Vec<Lines>, HalError> {
+    let line = |(n, joint): (usize, &JointConfig)| {
+        Ok(Lines {
+            step: hal.bit_pin(&format!("stepgen.{n}.step"))?,
+            dir: hal.bit_pin(&format!("stepgen.{n}.dir"))?,
+            step_cursor: 0,
+            dir_cursor: 0,
+            positive: false,
+            kind: joint.kind,
+            steps_per_unit: joint.steps_per_unit,
+            motor_position: hal.float_pin(&format!("motor.{n}.position"))?,
+        })
+    };
+    config.joints.iter().enumerate().map(line).collect()
+}
