@@ -51,6 +51,13 @@ pub enum InverseError {
         /// The guard, mm.
         guard_mm: f64,
     },
+    /// O-X glide: the links are too short to reach this far from the rails.
+    TooFarFromRails {
+        /// y of the platform, mm.
+        y_mm: f64,
+        /// Length of the links, mm.
+        limit_mm: f64,
+    },
     /// O-X glide: the platform would be behind the rails.
     BelowRails {
         /// y of the platform, mm; must be ≥ 0.
@@ -278,6 +285,7 @@ impl InverseError {
             Self::GuideSide { mechanism, chain, .. } => Code::chain(mechanism, "guide_side", chain),
             Self::Singular { .. } => Code::plain("singular"),
             Self::FormSwitch { .. } => Code::plain("singular:form_switch"),
+            Self::TooFarFromRails { .. } => Code::plain("unreachable"),
             Self::BelowRails { .. } => Code::plain("below_rails"),
             Self::OutsideWireSpan { .. } => Code::plain("outside_wire_span"),
             Self::WireLength { .. } => Code::plain("wire_length"),
@@ -344,6 +352,9 @@ impl fmt::Display for InverseError {
                 "{c_mm:.3} mm from the form switch, where the platform is not held (guard {guard_mm} mm); \
                  lower y, or use the form-switch command",
             ),
+            Self::TooFarFromRails { y_mm, limit_mm } => {
+                write!(f, "y = {y_mm:.3} mm is out of the links' reach (0 to {limit_mm:.3} mm)")
+            }
             Self::BelowRails { y_mm } => {
                 write!(f, "y = {y_mm:.3} mm is behind the rails; y must be 0 or more")
             }

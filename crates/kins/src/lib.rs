@@ -8,17 +8,24 @@
 
 pub mod cartesian;
 pub mod errors;
+pub mod hv_machine;
+pub mod hv_mill;
 pub mod kinematics;
 pub mod machine;
 pub mod maths;
 pub mod moma;
 pub mod moma_4s;
 pub mod moma_w;
+pub mod ox_glide;
 pub mod planar;
 pub mod pose;
+#[allow(dead_code)]
+pub mod vector;
 
 pub use cartesian::Cartesian;
 pub use errors::{ForwardError, GeometryError, InverseError, Key, NoIntersection};
+pub use hv_machine::{HvMachine, HvMachineParameters, HvSideParameters};
+pub use hv_mill::{HeadParameters, HvMill, HvMillParameters, HvState, Spindle, Turn, delta_t_workpiece};
 pub use kinematics::{
     Branches, Jacobian, JointKind, JointLimit, JointMotion, JointRange, Joints, Kinematics, LimitCode,
     MAX_JOINTS, Side, Singularity,
@@ -27,5 +34,7 @@ pub use machine::Mechanism;
 pub use moma::{Moma, MomaConfiguration, MomaParameters};
 pub use moma_4s::{Moma4s, Moma4sConfiguration, Moma4sParameters};
 pub use moma_w::{MomaW, MomaWParameters};
+pub use ox_glide::{FormSwitch, FormSwitchError, OxForm, OxGlide, OxGlideParameters};
 pub use planar::{Planar, PlanarParameters, PlanarState, Vec2};
 pub use pose::{Axis, AxisSet, Pose};
+pub use vector::Vec3;

@@ -2,12 +2,15 @@
 
 use crate::cartesian::Cartesian;
 use crate::errors::{ForwardError, InverseError};
+use crate::hv_machine::HvMachine;
+use crate::hv_mill::HvMill;
 use crate::kinematics::{
     Branches, Jacobian, JointKind, JointLimit, JointMotion, Joints, Kinematics, LimitCode, Singularity,
 };
 use crate::moma::Moma;
 use crate::moma_4s::Moma4s;
 use crate::moma_w::MomaW;
+use crate::ox_glide::OxGlide;
 use crate::planar::Planar;
 use crate::pose::{AxisSet, Pose};
 
@@ -84,6 +87,12 @@ mechanisms! {
     Moma4s(Moma4s),
     /// Hot wire between two MOMA 4S.
     MomaW(MomaW),
+    /// One mechanism of the HV-Mill with carriage, table and head.
+    HvMill(HvMill),
+    /// The HV-Mill with both mechanisms, one active.
+    HvMachine(HvMachine),
+    /// Two forms on one rail.
+    OxGlide(OxGlide),
 }
 
 impl Mechanism {
@@ -92,6 +101,7 @@ impl Mechanism {
     pub fn without_limits(self) -> Self {
         match self {
             Self::MomaW(m) => Self::MomaW(m.without_limits()),
+            Self::OxGlide(m) => Self::OxGlide(m.without_limits()),
             other => other,
         }
     }
