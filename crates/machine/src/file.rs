@@ -10,6 +10,9 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml::de::DeTable;
 
+/// A file that is not TOML at all is not told so on every line.
+const MOST_SYNTAX_ERRORS: usize = 5;
+
 /// A number with its place in the text.
 pub type Number = Spanned<f64>;
 
@@ -220,8 +223,17 @@ impl MachineFile {
         }
         let mut findings = Findings::new(&source);
         let (mut root, errors) = DeTable::parse_recoverable(text);
+        // The parser goes on after an error; what follows on the same line is seldom news.
+        let mut last_line = None;
         for error in &errors {
-            findings.syntax(error);
+            let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count());
+            if line.is_none() || line != last_line {
+                findings.syntax(error);
+            }
+            last_line = line;
+            if findings.len() == MOST_SYNTAX_ERRORS {
+                break;
+            }
         }
         if !findings.is_empty() {
             return Err(findings.into_list());

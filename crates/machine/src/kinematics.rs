@@ -21,6 +21,8 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 /// `[kinematics]` as written.
 #[derive(Debug, Clone)]
 pub struct KinematicsFile {
+    /// One of [`TYPES`].
+    pub kind: String,
     /// The parameters of the chosen mechanism.
     pub parameters: Parameters,
     places: Vec<Place>,
@@ -107,7 +109,7 @@ impl KinematicsFile {
             }
         };
         match parameters {
-            Ok(parameters) => Some(Spanned::new(span, Self { parameters, places })),
+            Ok(parameters) => Some(Spanned::new(span, Self { kind, parameters, places })),
             Err(error) => {
                 findings.shape(&error);
                 None
@@ -134,8 +136,9 @@ impl KinematicsFile {
         };
         built
             .map_err(|error| {
+                let help = "the parameters must make a mechanism; `pkm machines NAME` shows a set that does";
                 let span = error.key().and_then(|key| self.place(key)).unwrap_or(span);
-                findings.error("machine-geometry", span, format!("kinematics: {error}"), "");
+                findings.error("machine-geometry", span, format!("kinematics: {error}"), help);
             })
             .ok()
     }

@@ -54,8 +54,12 @@ pub fn read(name_or_path: &str) -> Result<String, Vec<Diagnostic>> {
         let help = "give a machine file (TOML)".to_owned();
         return Err(refuse("machine-too-large", format!("larger than {MAX_BYTES} bytes"), help));
     }
-    String::from_utf8(bytes).map_err(|error| {
-        let message = format!("not a text file: byte {} is not UTF-8", error.utf8_error().valid_up_to() + 1);
+    let not_text = |at: usize| {
+        let message = format!("not a text file (byte {} is neither UTF-8 nor printable)", at + 1);
         refuse("machine-not-text", message, "a machine file is TOML in UTF-8".to_owned())
-    })
+    };
+    if let Some(at) = bytes.iter().position(|&byte| byte == 0) {
+        return Err(not_text(at));
+    }
+    String::from_utf8(bytes).map_err(|error| not_text(error.utf8_error().valid_up_to()))
 }

@@ -19,6 +19,8 @@ pub struct Machine {
     pub description: String,
     /// Where the geometry comes from.
     pub source: String,
+    /// `kinematics.type` of the file.
+    pub mechanism_type: String,
     /// Pose ⇄ joints.
     pub mechanism: Mechanism,
     /// In joint order; as many as the mechanism has.
@@ -56,6 +58,25 @@ pub struct Joint {
     pub timing: StepTiming,
     /// The driver and its minima.
     pub driver: DriverTiming,
+}
+
+impl Joint {
+    /// mm or rad → mm or degrees, as people and files state it. Also for rates.
+    pub fn to_face(&self, value: f64) -> f64 {
+        match self.kind {
+            JointKind::Linear => value,
+            JointKind::Rotary => maths::degrees(value),
+        }
+    }
+
+    /// mm or degrees → mm or rad. Also for rates.
+    #[allow(clippy::wrong_self_convention)] // the opposite of `to_face`
+    pub fn from_face(&self, value: f64) -> f64 {
+        match self.kind {
+            JointKind::Linear => value,
+            JointKind::Rotary => maths::radians(value),
+        }
+    }
 }
 
 /// Limits of one axis; what is absent is limited by the joints alone.
@@ -153,6 +174,7 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
         name: name?,
         description: tables.description.clone(),
         source: tables.source.clone(),
+        mechanism_type: file.kinematics.get_ref().kind.clone(),
         mechanism: mechanism?,
         joints: joints?,
         axes: axes?,

@@ -1,9 +1,7 @@
 //! A machine's answer to a pose or to joint positions: the mechanism's answer, within the joints' travel.
 
 use crate::machine::{Joint, Machine};
-use pkm_kins::{
-    ForwardError, InverseError, JointKind, JointLimit, JointRange, Joints, Kinematics, Pose, maths,
-};
+use pkm_kins::{ForwardError, InverseError, JointKind, JointLimit, JointRange, Joints, Kinematics, Pose};
 
 /// Why a machine refuses a pose or joint positions.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,15 +92,15 @@ impl Machine {
 /// `joint p2 would need -3.100 mm (travel 0 to 200 mm)`; degrees for a rotary joint.
 pub(crate) fn travel(limit: &JointLimit, joints: &[Joint]) -> String {
     let Some(joint) = joints.get(limit.joint) else { return format!("joint {} has no travel", limit.joint) };
-    let (unit, face): (&str, fn(f64) -> f64) = match joint.kind {
-        JointKind::Linear => ("mm", |mm| mm),
-        JointKind::Rotary => ("°", maths::degrees),
+    let unit = match joint.kind {
+        JointKind::Linear => "mm",
+        JointKind::Rotary => "°",
     };
     format!(
         "joint {} would need {:.3} {unit} (travel {} to {} {unit})",
         joint.name,
-        face(limit.value),
-        face(joint.range.min),
-        face(joint.range.max)
+        joint.to_face(limit.value),
+        joint.to_face(joint.range.min),
+        joint.to_face(joint.range.max)
     )
 }

@@ -117,6 +117,10 @@ impl<'a> Findings<'a> {
         self.list.is_empty()
     }
 
+    pub(crate) fn len(&self) -> usize {
+        self.list.len()
+    }
+
     pub(crate) fn into_list(mut self) -> Vec<Diagnostic> {
         self.list.sort_by_key(|finding| (finding.file != self.source.file, finding.line, finding.column));
         self.list

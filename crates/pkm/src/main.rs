@@ -1,2 +1,23 @@
-//! The command line.
-fn main() {}
+//! `pkm`: parse arguments, call the rooms, show results.
+
+mod cli;
+mod commands;
+mod outcome;
+mod render;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = cli::Cli::parse();
+    let messages = render::diagnostics::Messages::new(cli.color, cli.command.overrides());
+    let result = match &cli.command {
+        cli::Command::Kins(command) => commands::kins::run(command),
+        cli::Command::Machines(arguments) => commands::machines::run(arguments),
+        cli::Command::Generate(arguments) => commands::generate::run(arguments),
+    };
+    match result {
+        Ok(outcome) => outcome.into(),
+        Err(failure) => failure.report(&messages).into(),
+    }
+}

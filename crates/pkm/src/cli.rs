@@ -1,0 +1,122 @@
+//! The command line: one definition, from which help, man page and completions come.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Motion control for parallel-kinematic machines: G-code in, verified motion and step pulses out.
+///
+/// Exit status: 0 done, nothing to object to; 1 the answer is "no" (an error in the program, a pose out of reach, a limit
+/// exceeded); 2 the question could not be asked (bad usage, unreadable file, invalid machine file); 130 interrupted.
+#[derive(Debug, Parser)]
+#[command(name = "pkm", version, propagate_version = true, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    /// When to colour messages; NO_COLOR and TERM=dumb are honoured
+    #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN")]
+    pub color: Color,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// When to colour messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Color {
+    /// On a terminal
+    Auto,
+    /// Always
+    Always,
+    /// Never
+    Never,
+}
+
+/// How the result is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// For a person
+    Text,
+    /// For a script; carries "schema": 1
+    Json,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Pose to joints and back, JSON lines in and out
+    #[command(subcommand)]
+    Kins(Kins),
+    /// List the machines that ship, or print one annotated machine file
+    Machines(Machines),
+    /// Write the man page or shell completions to standard output
+    Generate(Generate),
+}
+
+impl Command {
+    /// The `--set` texts of this command.
+    pub(crate) fn overrides(&self) -> &[String] {
+        match self {
+            Self::Kins(Kins::Inverse(arguments) | Kins::Forward(arguments) | Kins::Jacobian(arguments)) => {
+                &arguments.machine.set
+            }
+            Self::Machines(_) | Self::Generate(_) => &[],
+        }
+    }
+}
+
+/// The machine, wherever one is needed.
+#[derive(Debug, Args)]
+pub(crate) struct MachineArgs {
+    /// Machine file, or the name of a shipped machine (see `pkm machines`)
+    #[arg(long, value_name = "FILE")]
+    pub machine: String,
+    /// Override a key of the machine file, e.g. 'joint.*.max_velocity_mm_s=100'; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Kins {
+    /// {"x":..,"y":..,...} (mm, degrees; absent = 0) → {"joints":[..]}
+    Inverse(KinsArgs),
+    /// {"joints":[..]} (optional "seed":{pose}) → {"pose":{"x":..,...}}
+    Forward(KinsArgs),
+    /// A pose → {"joints":[..],"inverse_jacobian":[[..]],"determinant":..,"condition":..}; rotary columns per radian
+    Jacobian(KinsArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct KinsArgs {
+    #[command(flatten)]
+    pub machine: MachineArgs,
+    /// Ask for geometry alone: joint travel and other limits do not apply
+    #[arg(long)]
+    pub no_limits: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Machines {
+    /// Print this machine's file
+    pub name: Option<String>,
+    /// How the list is printed
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Generate {
+    /// What to write
+    #[arg(value_enum)]
+    pub what: What,
+    /// Write the man page of this subcommand, e.g. `run`
+    #[arg(long, value_name = "NAME")]
+    pub subcommand: Option<String>,
+}
+
+/// What `pkm generate` writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum What {
+    /// Man page (roff)
+    Man,
+    /// Completions for bash
+    CompleteBash,
+    /// Completions for zsh
+    CompleteZsh,
+    /// Completions for fish
+    CompleteFish,
+}

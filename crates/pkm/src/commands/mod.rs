@@ -1,0 +1,5 @@
+//! One file per subcommand.
+
+pub(crate) mod generate;
+pub(crate) mod kins;
+pub(crate) mod machines;

@@ -1,0 +1,156 @@
+//! Diagnostics as text (the span underlined) and as JSON objects.
+
+use crate::cli::Color;
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+use pkm_canon::diagnostic::{Diagnostic, Severity};
+use pkm_machine::{shipped, source};
+use serde::Serialize;
+use std::env;
+use std::fs::File;
+use std::io::{BufRead, BufReader, IsTerminal, Read, Write, stderr};
+
+/// A diagnostic as scripts read it.
+#[allow(dead_code)] // `run` and `check` print it
+#[derive(Debug, Serialize)]
+pub(crate) struct Json<'a> {
+    code: &'a str,
+    severity: &'static str,
+    message: &'a str,
+    file: &'a str,
+    line: u32,
+    column: u32,
+    help: Option<&'a str>,
+}
+
+impl<'a> From<&'a Diagnostic> for Json<'a> {
+    fn from(diagnostic: &'a Diagnostic) -> Self {
+        let severity = match diagnostic.severity {
+            Severity::Note => "note",
+            Severity::Warning => "warning",
+            Severity::Error => "error",
+        };
+        Self {
+            code: &diagnostic.code,
+            severity,
+            message: &diagnostic.message,
+            file: &diagnostic.file,
+            line: diagnostic.line,
+            column: diagnostic.column,
+            help: diagnostic.help.as_deref(),
+        }
+    }
+}
+
+/// Prints messages to standard error.
+pub(crate) struct Messages {
+    renderer: Renderer,
+    /// The `--set` texts, which diagnostics may point into.
+    overrides: String,
+}
+
+/// The most bytes of a source line that are shown.
+const LONGEST_LINE: usize = 512;
+
+impl Messages {
+    /// Coloured or not, as asked and as the terminal allows.
+    pub(crate) fn new(color: Color, overrides: &[String]) -> Self {
+        let styled = match color {
+            Color::Always => true,
+            Color::Never => false,
+            Color::Auto => {
+                stderr().is_terminal()
+                    && env::var_os("NO_COLOR").is_none()
+                    && env::var_os("TERM").is_none_or(|terminal| terminal != "dumb")
+            }
+        };
+        let renderer = if styled { Renderer::styled() } else { Renderer::plain() };
+        Self { renderer, overrides: overrides.join("\n") }
+    }
+
+    /// Prints the messages; a standard error that cannot be written to is ignored.
+    pub(crate) fn print(&self, diagnostics: &[Diagnostic]) {
+        let mut err = stderr().lock();
+        for diagnostic in diagnostics {
+            let _ = writeln!(err, "{}\n", self.text(diagnostic));
+        }
+    }
+
+    /// One message: title with code, place, underlined source line where it can be read again, help.
+    pub(crate) fn text(&self, diagnostic: &Diagnostic) -> String {
+        let level = match diagnostic.severity {
+            Severity::Note => Level::NOTE,
+            Severity::Warning => Level::WARNING,
+            Severity::Error => Level::ERROR,
+        };
+        let title = level.primary_title(diagnostic.message.as_str()).id(diagnostic.code.as_str());
+        let mut group = Group::with_title(title);
+        let line = self.source_line(diagnostic);
+        match &line {
+            Some(line) => {
+                let start = (diagnostic.column as usize).saturating_sub(1).min(line.len());
+                let end = (diagnostic.end_column as usize).saturating_sub(1).clamp(start, line.len());
+                let span = floor(line, start)..floor(line, end);
+                group = group.element(
+                    Snippet::source(line.as_str())
+                        .line_start(diagnostic.line as usize)
+                        .path(diagnostic.file.as_str())
+                        .annotation(AnnotationKind::Primary.span(span)),
+                );
+            }
+            None => {
+                let mut origin = Origin::path(diagnostic.file.as_str());
+                if diagnostic.line > 0 {
+                    origin = origin.line(diagnostic.line as usize);
+                    if diagnostic.column > 0 {
+                        origin = origin.char_column(diagnostic.column as usize);
+                    }
+                }
+                group = group.element(origin);
+            }
+        }
+        if let Some(help) = &diagnostic.help {
+            group = group.element(Level::HELP.message(help.as_str()));
+        }
+        self.renderer.render(&[group])
+    }
+
+    /// The source line of a diagnostic, if it can be read again.
+    fn source_line(&self, diagnostic: &Diagnostic) -> Option<String> {
+        let number = (diagnostic.line as usize).checked_sub(1)?;
+        let from_text = |text: &str| text.lines().nth(number).map(str::to_owned);
+        let line = if diagnostic.file == source::OVERRIDES_FILE {
+            from_text(&self.overrides)?
+        } else if diagnostic.file == "-" {
+            return None;
+        } else if let (true, Some(text)) =
+            (diagnostic.code.starts_with("machine-"), shipped::text(&diagnostic.file))
+        {
+            from_text(text)?
+        } else {
+            line_of_file(&diagnostic.file, number)?
+        };
+        Some(line)
+    }
+}
+
+/// A line of a file (counted from 0), at most [`LONGEST_LINE`] bytes of it.
+fn line_of_file(path: &str, number: usize) -> Option<String> {
+    let mut reader = BufReader::new(File::open(path).ok()?);
+    let mut line = Vec::new();
+    for _ in 0..number {
+        if reader.skip_until(b'\n').ok()? == 0 {
+            return None;
+        }
+    }
+    (&mut reader).take(LONGEST_LINE as u64).read_until(b'\n', &mut line).ok()?;
+    let text = String::from_utf8_lossy(&line);
+    Some(text.trim_end_matches(['\n', '\r']).to_owned())
+}
+
+/// The nearest character boundary at or below a byte offset.
+fn floor(text: &str, mut offset: usize) -> usize {
+    while !text.is_char_boundary(offset) {
+        offset -= 1;
+    }
+    offset
+}

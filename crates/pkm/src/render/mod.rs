@@ -1,0 +1,3 @@
+//! How results and messages look.
+
+pub(crate) mod diagnostics;

@@ -1,0 +1,230 @@
+//! `pkm kins` against the published example vectors.
+
+use crate::support::{pkm_with_input, write};
+use serde_json::{Value, json};
+use std::path::Path;
+
+const VECTORS: &str = include_str!("../crates/kins/tests/data/planar-examples.json");
+/// mm, and relative for Jacobian entries.
+const TOLERANCE: f64 = 1e-9;
+
+fn vectors() -> Value {
+    serde_json::from_str(VECTORS).unwrap()
+}
+
+fn array(value: &Value) -> &[Value] {
+    value.as_array().unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap()
+}
+
+/// Asks one question per line; the answers, and the exit status.
+fn ask(what: &str, machine: &str, flags: &[&str], questions: &[Value]) -> (Vec<Value>, i32) {
+    let input: String = questions.iter().map(|question| format!("{question}\n")).collect();
+    let arguments = [&["kins", what, "--machine", machine], flags].concat();
+    let run = pkm_with_input(&arguments, input.as_bytes());
+    let answers = run.json_lines();
+    assert_eq!(answers.len(), questions.len(), "{machine}: {}", run.stderr);
+    (answers, run.status)
+}
+
+#[track_caller]
+fn assert_near(found: &Value, expected: &Value, context: &str) {
+    let (found, expected) = (number(found), number(expected));
+    assert!(
+        (found - expected).abs() <= TOLERANCE * expected.abs().max(1.0),
+        "{context}: {found} is not {expected}"
+    );
+}
+
+/// Asks for every good row t1 t2 p1 p2 k11 k12 k21 k22 det_k in all directions.
+fn check_planar_rows(machine: &str, rows: &[Value]) {
+    let poses: Vec<Value> = rows.iter().map(|row| json!({ "x": row[0], "y": row[1] })).collect();
+    let joints: Vec<Value> = rows.iter().map(|row| json!({ "joints": [row[2], row[3]] })).collect();
+    let (inverse, status) = ask("inverse", machine, &[], &poses);
+    assert_eq!(status, 0, "{machine}: {inverse:?}");
+    let (forward, status) = ask("forward", machine, &[], &joints);
+    assert_eq!(status, 0, "{machine}: {forward:?}");
+    let (jacobian, status) = ask("jacobian", machine, &[], &poses);
+    assert_eq!(status, 0, "{machine}: {jacobian:?}");
+    for (i, row) in rows.iter().enumerate() {
+        let context = format!("{machine} row {i}");
+        for j in 0..2 {
+            assert_near(&inverse[i]["joints"][j], &row[2 + j], &context);
+            assert_near(&forward[i]["pose"][["x", "y"][j]], &row[j], &context);
+            for k in 0..2 {
+                assert_near(&jacobian[i]["inverse_jacobian"][j][k], &row[4 + 2 * j + k], &context);
+            }
+        }
+        assert_near(&jacobian[i]["determinant"], &row[8], &context);
+    }
+}
+
+/// Each refused row must name one of the violations that hold.
+fn check_refused(what: &str, machine: &str, questions: &[Value], violations: &[&Value]) {
+    let (answers, status) = ask(what, machine, &[], questions);
+    assert_eq!(status, 1, "{machine}");
+    for ((answer, question), violations) in answers.iter().zip(questions).zip(violations) {
+        let code = &answer["error"]["code"];
+        assert!(array(violations).contains(code), "{machine} {question}: {code} is not among {violations}");
+        assert!(!answer["error"]["message"].as_str().unwrap().is_empty());
+    }
+}
+
+fn check_bad_rows(machine: &str, configuration: &Value) {
+    for (what, key) in [("inverse", "ik_bad"), ("forward", "fk_bad")] {
+        let Some(rows) = configuration[key].as_array() else { continue };
+        let questions: Vec<Value> = rows
+            .iter()
+            .map(|row| match what {
+                "inverse" => json!({ "x": row[0], "y": row[1] }),
+                _ => json!({ "joints": [row[0], row[1]] }),
+            })
+            .collect();
+        let violations: Vec<&Value> = rows.iter().map(|row| &row[2]).collect();
+        check_refused(what, machine, &questions, &violations);
+    }
+}
+
+#[test]
+fn moma_configurations_match_the_vectors() {
+    let vectors = vectors();
+    for (name, configuration) in vectors["moma"]["configs"].as_object().unwrap() {
+        let machine = format!("moma-{name}");
+        check_planar_rows(&machine, array(&configuration["rows"]));
+        check_bad_rows(&machine, configuration);
+    }
+}
+
+#[test]
+fn moma_4s_configurations_match_the_vectors() {
+    let vectors = vectors();
+    for (name, configuration) in vectors["moma_4s"]["configs"].as_object().unwrap() {
+        let machine = name.to_lowercase().replace(' ', "-");
+        check_planar_rows(&machine, array(&configuration["rows"]));
+        check_bad_rows(&machine, configuration);
+    }
+}
+
+/// moma-a with other geometry and wide home checks: a machine file of a general planar mechanism.
+fn planar_machine(folder: &Path, parameters: &Value, home: [f64; 2]) -> String {
+    let text = format!(
+        "name = \"general\"\n[servo]\nperiod_ns = 1000000\n[driver]\nmodel = \"TMC2209\"\n[kinematics]\n\
+         type = \"planar\"\nreference_mm = {}\nguide_angle_deg = {}\nl_mm = {}\noffset_mm = {}\n\
+         working_mode = {}\nassembly = {}\n{}{}[home]\nx = {}\ny = {}\n",
+        parameters["R"],
+        parameters["alpha_deg"],
+        parameters["l"],
+        parameters["off"],
+        parameters["sigma"],
+        parameters["side"],
+        joint("p1", &parameters["stroke"][0]),
+        joint("p2", &parameters["stroke"][1]),
+        home[0],
+        home[1]
+    );
+    let path = folder.join("general.toml");
+    write(&path, text);
+    path.to_str().unwrap().to_owned()
+}
+
+fn joint(name: &str, stroke: &Value) -> String {
+    format!(
+        "[[joint]]\nname = \"{name}\"\nmin_mm = {}\nmax_mm = {}\nmax_velocity_mm_s = 100\n\
+         max_acceleration_mm_s2 = 1000\nsteps_per_mm = 400\n",
+        stroke[0], stroke[1]
+    )
+}
+
+#[test]
+fn general_planar_mechanisms_match_the_vectors() {
+    let vectors = vectors();
+    let folder = tempfile::tempdir().unwrap();
+    for mechanism in array(&vectors["planar_general"]["mechanisms"]) {
+        let rows = array(&mechanism["rows"]);
+        // Any regular row may be the home pose.
+        let home =
+            rows.iter().max_by(|a, b| number(&a[8]).abs().min(1.0).total_cmp(&number(&b[8]).abs().min(1.0)));
+        let home = home.unwrap();
+        let machine =
+            planar_machine(folder.path(), &mechanism["params"], [number(&home[0]), number(&home[1])]);
+        check_planar_rows(&machine, rows);
+    }
+}
+
+#[test]
+fn moma_w_matches_the_vectors() {
+    let vectors = vectors();
+    let rows = array(&vectors["moma_w"]["rows"]);
+    let pose = |row: &Value| json!({ "x": row[0], "y": row[1], "u": row[2], "v": row[3], "z": row[4] });
+    let poses: Vec<Value> = rows.iter().map(pose).collect();
+    let joints: Vec<Value> =
+        rows.iter().map(|row| json!({ "joints": [row[9], row[10], row[11], row[12], row[4]] })).collect();
+    let (inverse, _) = ask("inverse", "moma-w", &[], &poses);
+    let (forward, _) = ask("forward", "moma-w", &[], &joints);
+    let (jacobian, _) = ask("jacobian", "moma-w", &[], &poses);
+    for (i, row) in rows.iter().enumerate() {
+        let context = format!("moma-w row {i}");
+        for j in 0..4 {
+            assert_near(&inverse[i]["joints"][j], &row[9 + j], &context);
+        }
+        for (column, letter) in ["x", "y", "u", "v", "z"].into_iter().enumerate() {
+            assert_near(&forward[i]["pose"][letter], &row[column], &context);
+        }
+        // The table's row and column leave the determinant of the wire's four joints, but for the order x y z u v:
+        // two columns change places, which keeps the sign.
+        assert_near(&jacobian[i]["determinant"], &row[14], &context);
+    }
+    let bad = array(&vectors["moma_w"]["bad"]);
+    let questions: Vec<Value> = bad.iter().map(pose).collect();
+    check_refused("inverse", "moma-w", &questions, &bad.iter().map(|row| &row[5]).collect::<Vec<_>>());
+}
+
+#[test]
+fn no_limits_asks_for_geometry_alone() {
+    let question = [json!({ "joints": [-10, -10] })];
+    let (answers, status) = ask("forward", "moma-a", &[], &question);
+    assert_eq!((&answers[0]["error"]["code"], status), (&json!("limit_low:1"), 1));
+    assert_eq!(answers[0]["error"]["joint"], "p1");
+    let (answers, status) = ask("forward", "moma-a", &["--no-limits"], &question);
+    assert_eq!(status, 0);
+    let (back, status) = ask("inverse", "moma-a", &["--no-limits"], &[answers[0]["pose"].clone()]);
+    assert_eq!(status, 0);
+    assert_near(&back[0]["joints"][0], &json!(-10), "joint 1");
+}
+
+#[test]
+fn branches_lists_every_mode() {
+    let (answers, status) = ask("inverse", "moma-d", &[], &[json!({ "x": 75, "y": 117, "branches": true })]);
+    assert_eq!(status, 0);
+    let branches = array(&answers[0]["branches"]);
+    assert_eq!(branches.len(), 4);
+    assert_eq!(branches.iter().filter(|branch| branch["error"].is_null()).count(), 1, "{branches:?}");
+    assert_eq!(branches.iter().filter(|branch| branch["joints"] == json!([114.0, 180.0])).count(), 1);
+    let (answers, _) = ask("forward", "moma-d", &[], &[json!({ "joints": [114, 180], "branches": true })]);
+    let branches = array(&answers[0]["branches"]);
+    assert_eq!(branches.len(), 2);
+    assert!(branches.iter().any(|branch| (number(&branch["pose"]["x"]) - 75.0).abs() < 1e-9), "{branches:?}");
+}
+
+#[test]
+fn refused_lines_keep_their_place() {
+    let lines = "{\"x\":0,\"y\":-265}\nnot json\n{\"x\":1e999}\n{\"q\":1}\n{\"z\":1}\n{\"x\":0,\"y\":-266}\n[1]\n\"\u{fffd}\"";
+    let run = pkm_with_input(&["kins", "inverse", "--machine", "moma-a"], lines.as_bytes());
+    let answers = run.json_lines();
+    assert_eq!(run.status, 1);
+    assert_eq!(answers.len(), 8);
+    for (index, answer) in answers.iter().enumerate() {
+        assert_eq!(answer["error"].is_null(), matches!(index, 0 | 5), "{index}: {answer}");
+    }
+    let (answers, status) = ask(
+        "forward",
+        "moma-a",
+        &[],
+        &[json!({ "joints": [1, 2, 3] }), json!({ "joints": [100, 100], "seed": {} })],
+    );
+    assert_eq!((answers[0]["error"]["code"].as_str(), status), (Some("bad_input"), 1));
+    assert!(answers[1]["pose"]["y"].is_number() && answers[1]["pose"]["z"].is_null());
+}

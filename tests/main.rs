@@ -1,0 +1,5 @@
+//! Whole-program tests of `pkm`: what goes in at the command line, what comes out, and the exit status.
+
+mod kins;
+mod machines;
+mod support;
