@@ -125,17 +125,23 @@ impl EdgeQueue {
         self.edges.push(LineEdge { time, level });
     }
 
+    /// How many of the edges come up to and including `time`; the few that do not are at the end.
+    #[inline]
+    fn until(&self, time: u64) -> usize {
+        self.edges.len() - self.edges.iter().rev().take_while(|edge| edge.time > time).count()
+    }
+
     /// Forgets the edges up to and including `time`.
     #[inline]
     pub fn retire(&mut self, time: u64) {
-        let past = self.edges.iter().take_while(|edge| edge.time <= time).count();
+        let past = self.until(time);
         self.edges.drain(..past);
         self.first += past as u64;
     }
 
     /// Drops the edges after `time`, but leaves the end of a pulse that has begun. Returns how many were dropped.
     pub fn cut_after(&mut self, time: u64) -> usize {
-        let past = self.edges.iter().take_while(|edge| edge.time <= time).count();
+        let past = self.until(time);
         let high = past > 0 && self.edges[past - 1].level;
         let keep = (past + usize::from(high)).min(self.edges.len());
         let dropped = self.edges.len() - keep;
@@ -146,17 +152,16 @@ impl EdgeQueue {
     /// The edges that the cursor has not seen, up to and including `until`; moves the cursor past them.
     #[inline]
     pub fn read(&self, cursor: &mut u64, until: u64) -> &[LineEdge] {
-        let start = (cursor.saturating_sub(self.first) as usize).min(self.edges.len());
-        let fresh = &self.edges[start..];
-        let count = fresh.iter().take_while(|edge| edge.time <= until).count();
-        *cursor = self.first + (start + count) as u64;
-        &fresh[..count]
+        let end = self.until(until);
+        let start = (cursor.saturating_sub(self.first) as usize).min(end);
+        *cursor = self.first + end as u64;
+        &self.edges[start..end]
     }
 
     /// The level after the last edge up to and including `time`, if there is such an edge.
     #[inline]
     pub fn level_at(&self, time: u64) -> Option<bool> {
-        self.edges.iter().rev().find(|edge| edge.time <= time).map(|edge| edge.level)
+        self.edges[..self.until(time)].last().map(|edge| edge.level)
     }
 }
 
@@ -226,9 +231,19 @@ impl Values {
         &self.edges[self.bits.pins[pin.0 as usize] as usize]
     }
 
-    /// The same, for the line's writer.
+    /// The same, taken out for the line's writer, who puts them back with [`Self::put_edges`].
     #[inline]
-    pub fn edges_mut(&mut self, pin: BitPin) -> &mut EdgeQueue {
-        &mut self.edges[self.bits.pins[pin.0 as usize] as usize]
+    pub fn take_edges(&mut self, pin: BitPin) -> EdgeQueue {
+        std::mem::take(&mut self.edges[self.bits.pins[pin.0 as usize] as usize])
+    }
+
+    /// Puts the edges back; the line takes the level that it has at `now`.
+    #[inline]
+    pub fn put_edges(&mut self, pin: BitPin, edges: EdgeQueue, now: u64) {
+        let cell = self.bits.pins[pin.0 as usize] as usize;
+        if let Some(level) = edges.level_at(now) {
+            self.bits.cells[cell] = level;
+        }
+        self.edges[cell] = edges;
     }
 }

@@ -16,7 +16,7 @@
 //! A turning point that passes a half-step position by less than [`TURN_TOLERANCE`] and comes back within the same
 //! period is not worth two steps and makes none; between servo ticks the count may so be off by ½ + 1/128 step.
 //!
-//! Cost: one division per joint and period, one per step in uniform motion, two to three with acceleration.
+//! Cost: four divisions per joint and period, none per step while the speed changes little, one to three near rest.
 
 use crate::timing::Period;
 
@@ -238,8 +238,10 @@ impl Crossings {
                 // nearly straight: the slopes differ from d by 2⁻²⁰, the crossing by 2⁻²² of the period at most
                 if (m0 - d).abs() + (m1 - d).abs() <= d.abs() / 1_048_576.0 {
                     emit_straight(r0, d, &piece, period, emit);
+                } else if let Some(inverse) = Inverse::new(d, m0, m1, period) {
+                    emit_gentle(&cubic, &inverse, &piece, period, emit);
                 } else {
-                    emit_piece(&cubic, &piece, Guess::new(d, m0, m1), period, emit);
+                    emit_piece(&cubic, &piece, period, emit);
                 }
             }
         } else if end != 0 || leaves_step(r0, d, m0, m1) {
@@ -248,7 +250,7 @@ impl Crossings {
                 return Err(EdgeError::TooFast { steps, max: max_steps });
             }
             for piece in &pieces {
-                emit_piece(&cubic, piece, Guess::None, period, emit);
+                emit_piece(&cubic, piece, period, emit);
             }
         }
         self.position = target;
@@ -288,25 +290,40 @@ fn cut(cubic: &Cubic, end: i64) -> ([Piece; 3], u64) {
     (pieces, steps)
 }
 
-/// First guess for a crossing.
+/// The inverse of a cubic whose slope changes little, as a cubic Hermite in y = (r − r₀)/d with the slopes d/m₀ and d/m₁.
 #[derive(Clone, Copy)]
-enum Guess {
-    /// On the secant of what is left of the piece.
-    None,
-    /// The inverse function as a cubic Hermite: u(y), y = (r − r₀)/d, slopes d/m₀ and d/m₁ at its ends.
-    Inverse { per_d: f64, s0: f64, c2: f64, c3: f64 },
+struct Inverse {
+    per_d: f64,
+    c1: f64,
+    c2: f64,
+    c3: f64,
+    /// Steps by which the cubic may miss the level for the guess to be good within about 1/64 timer tick.
+    tolerance: f64,
 }
 
-impl Guess {
-    fn new(d: f64, m0: f64, m1: f64) -> Self {
-        // worth it while the speed changes by less than about half
+impl Inverse {
+    /// None if the slope changes too much for it to be worth it.
+    fn new(d: f64, m0: f64, m1: f64, period: &Period) -> Option<Self> {
         let gentle = |m: f64| m.abs() > 0.5 * d.abs() && m.abs() < 2.0 * d.abs();
         if !(gentle(m0) && gentle(m1)) {
-            return Self::None;
+            return None;
         }
-        let (s0, s1) = (d / m0, d / m1);
-        Self::Inverse { per_d: 1.0 / d, s0, c2: 3.0 - 2.0 * s0 - s1, c3: s0 + s1 - 2.0 }
+        let (per_d, s0, s1) = (1.0 / d, d / m0, d / m1);
+        let tolerance = 0.5 * d.abs() * enough(period);
+        Some(Self { per_d, c1: s0, c2: 3.0 - 2.0 * s0 - s1, c3: s0 + s1 - 2.0, tolerance })
     }
+
+    #[inline]
+    fn at(&self, r: f64) -> f64 {
+        let y = r * self.per_d;
+        y * (self.c1 + y * (self.c2 + y * self.c3))
+    }
+}
+
+/// Error of u that does not matter: 1/64 timer tick.
+#[inline]
+fn enough(period: &Period) -> f64 {
+    1.0 / (64.0 * f64::from(period.ticks()))
 }
 
 #[inline]
@@ -334,18 +351,44 @@ fn emit_straight(r0: f64, d: f64, piece: &Piece, period: &Period, emit: &mut imp
     }
 }
 
-fn emit_piece(cubic: &Cubic, piece: &Piece, guess: Guess, period: &Period, emit: &mut impl FnMut(u64, bool)) {
+/// The whole period, monotone and gentle: the inverse where it is good enough, else the search.
+fn emit_gentle(
+    cubic: &Cubic,
+    inverse: &Inverse,
+    piece: &Piece,
+    period: &Period,
+    emit: &mut impl FnMut(u64, bool),
+) {
+    let rising = piece.to > piece.from;
+    let mut k = piece.from;
+    while k != piece.to {
+        let level = level(k, rising);
+        let mut u = inverse.at(level - cubic.c0);
+        let off = (cubic.at(u) - level).abs();
+        if off.is_nan() || off > inverse.tolerance {
+            u = solve(cubic, level, rising, 0.0, 1.0, u, period);
+        }
+        emit(time_of(u, period), rising);
+        k += if rising { 1 } else { -1 };
+    }
+}
+
+/// Any monotone piece: each crossing lies between the one before and the end.
+fn emit_piece(cubic: &Cubic, piece: &Piece, period: &Period, emit: &mut impl FnMut(u64, bool)) {
     let rising = piece.to > piece.from;
     let mut k = piece.from;
     let mut lo = piece.u0;
+    let mut at_lo = cubic.at(lo);
+    let at_end = cubic.at(piece.u1);
     while k != piece.to {
-        let u = if piece.at_start {
-            piece.u0
-        } else {
-            solve(cubic, level(k, rising), rising, lo, piece.u1, guess, period)
-        };
-        emit(time_of(u, period), rising);
-        lo = u;
+        if !piece.at_start {
+            let level = level(k, rising);
+            // on the secant of what is left
+            let guess = lo + (piece.u1 - lo) * ((level - at_lo) / (at_end - at_lo));
+            lo = solve(cubic, level, rising, lo, piece.u1, guess, period);
+            at_lo = level;
+        }
+        emit(time_of(lo, period), rising);
         k += if rising { 1 } else { -1 };
     }
 }
@@ -353,21 +396,19 @@ fn emit_piece(cubic: &Cubic, piece: &Piece, guess: Guess, period: &Period, emit:
 /// Where the cubic, monotone in [lo, hi], passes `level`. Safeguarded Newton: a step that leaves the bracket is
 /// replaced by its middle. State: bracket [lo, hi] with the crossing inside, or at the end that rounding left nearer.
 /// Ends when the step is below 1/64 timer tick; at most 64 evaluations, for from the ninth on the bracket is halved.
-fn solve(cubic: &Cubic, level: f64, rising: bool, lo: f64, hi: f64, guess: Guess, period: &Period) -> f64 {
-    let (mut lo, mut hi) = (lo, hi);
-    let enough = 1.0 / (64.0 * f64::from(period.ticks()));
-    let mut u = match guess {
-        Guess::Inverse { per_d, s0, c2, c3 } => {
-            let y = (level - cubic.c0) * per_d;
-            y * (s0 + y * (c2 + y * c3))
-        }
-        Guess::None => {
-            let (below, above) = (cubic.at(lo), cubic.at(hi));
-            lo + (hi - lo) * ((level - below) / (above - below))
-        }
-    };
+fn solve(
+    cubic: &Cubic,
+    level: f64,
+    rising: bool,
+    mut lo: f64,
+    mut hi: f64,
+    guess: f64,
+    period: &Period,
+) -> f64 {
+    let enough = enough(period);
+    let mut u = guess;
     for iteration in 0..64 {
-        if iteration >= 8 || !(u >= lo && u <= hi) {
+        if iteration >= 8 || !(lo..=hi).contains(&u) {
             u = 0.5 * (lo + hi);
         }
         let residual = cubic.at(u) - level;

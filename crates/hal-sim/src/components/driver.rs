@@ -195,22 +195,18 @@ impl Component for Drivers {
         let end = tick.period.end();
         for (driver, pins) in &mut self.channels {
             let enabled = values.bit(pins.enable);
-            let mut steps = values.edges(pins.step).read(&mut pins.step_cursor, end).iter().peekable();
+            let steps = values.edges(pins.step).read(&mut pins.step_cursor, end);
             let mut turns = values.edges(pins.dir).read(&mut pins.dir_cursor, end).iter().peekable();
             let position = driver.position;
             // both lines in order of time; at the same time the direction first, and its setup time is then 0
-            loop {
-                match (steps.peek(), turns.peek()) {
-                    (Some(step), turn) if turn.is_none_or(|turn| step.time < turn.time) => {
-                        driver.step_edge(step.time * self.timer_period_ns, step.level);
-                        steps.next();
-                    }
-                    (_, Some(turn)) => {
-                        driver.dir_edge(turn.time * self.timer_period_ns, turn.level);
-                        turns.next();
-                    }
-                    _ => break,
+            for step in steps {
+                while let Some(turn) = turns.next_if(|turn| turn.time <= step.time) {
+                    driver.dir_edge(turn.time * self.timer_period_ns, turn.level);
                 }
+                driver.step_edge(step.time * self.timer_period_ns, step.level);
+            }
+            for turn in turns {
+                driver.dir_edge(turn.time * self.timer_period_ns, turn.level);
             }
             if !enabled {
                 driver.position = position;

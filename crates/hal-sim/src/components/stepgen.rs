@@ -117,24 +117,22 @@ impl Stepgen {
     fn update(&mut self, values: &mut Values, tick: &Tick<'_>) -> Result<(), Fault> {
         let (start, end) = (tick.period.start(), tick.period.end());
         for (n, (generator, pins)) in self.channels.iter_mut().enumerate() {
-            values.edges_mut(pins.step).retire(start);
-            values.edges_mut(pins.dir).retire(start);
             let (position, velocity) = if values.bit(pins.enable) {
                 (values.float(pins.position_cmd), values.float(pins.velocity_cmd))
             } else {
                 (generator.position_of(generator.count()), 0.0)
             };
-            generator
-                .advance(position, velocity, &tick.period, |edge| {
-                    let pin = if edge.line == Line::Step { pins.step } else { pins.dir };
-                    values.edges_mut(pin).push(edge.time, edge.level);
-                })
-                .map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error })?;
-            for pin in [pins.step, pins.dir] {
-                if let Some(level) = values.edges(pin).level_at(end) {
-                    values.set_bit(pin, level);
-                }
-            }
+            let mut steps = values.take_edges(pins.step);
+            let mut turns = values.take_edges(pins.dir);
+            steps.retire(start);
+            turns.retire(start);
+            let result = generator.advance(position, velocity, &tick.period, |edge| match edge.line {
+                Line::Step => steps.push(edge.time, edge.level),
+                Line::Dir => turns.push(edge.time, edge.level),
+            });
+            values.put_edges(pins.step, steps, end);
+            values.put_edges(pins.dir, turns, end);
+            result.map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error })?;
         }
         Ok(())
     }

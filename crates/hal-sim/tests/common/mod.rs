@@ -32,7 +32,9 @@ pub fn config(joints: usize, timer_period_ns: u64) -> SimulationConfig {
 /// Position and velocity of joint n at time t: starts at rest, reverses, differs from joint to joint.
 pub fn wave(n: usize, t: f64) -> (f64, f64) {
     let omega = 3.0 + n as f64;
-    let (amplitude, base) = (20.0 / omega, n as f64 * 1.00125);
+    // about 20 mm/s; joint 4 is rotary: about 80 degrees/s
+    let (speed, base) = if n == 4 { (1.4, 0.5) } else { (20.0, n as f64 * 1.00125) };
+    let amplitude = speed / omega;
     (base + amplitude * (1.0 - cos(omega * t)), amplitude * omega * sin(omega * t))
 }
 
