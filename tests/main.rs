@@ -2,4 +2,5 @@
 
 mod kins;
 mod machines;
+mod programs;
 mod support;
