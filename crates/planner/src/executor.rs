@@ -22,6 +22,11 @@ pub(crate) struct Executor {
     leg_end: f64,
     x_end: f64,
     planned: bool,
+    /// Number of the next setpoint within its servo period, from 0.
+    substep: u32,
+    /// Nothing moves until the next servo period: the machine came to a stop, or dwells.
+    waits: bool,
+    dwells: bool,
     hold: bool,
     abort: bool,
     feed_override: f64,
@@ -36,6 +41,9 @@ impl Executor {
             leg_end: 0.0,
             x_end: 0.0,
             planned: false,
+            substep: 0,
+            waits: false,
+            dwells: false,
             hold: false,
             abort: false,
             feed_override: 1.0,
@@ -100,30 +108,25 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.executor.planned = false;
     }
 
-    /// One servo period. The result is where the machine has to be at its end.
+    /// One servo period (or one of its `substeps`). The result is where the machine has to be at its end.
     ///
     /// # Errors
     /// None in a machine whose path was accepted; an error of the kinematics here is a defect of the mechanism and
     /// leaves the machine at the last setpoint.
     pub fn tick(&mut self) -> Result<Setpoint, PlanError> {
-        // A fault only ends the queue: what is known is still driven to its end, at rest.
-        let _ = self.refill();
-        self.release_if_starving();
-        let period = self.settings.servo_period_s;
         let held = self.executor.hold || self.executor.abort;
-        let mut state = State::Moving;
-        let dwell = self.nodes.front_mut().filter(|node| node.dwell_ns > 0 && self.executor.at_rest());
-        if let Some(node) = dwell
-            && self.executor.sigma == 0.0
-        {
-            if !held {
-                // Whole ticks; the last one may be cut short.
-                node.dwell_ns = node.dwell_ns.saturating_sub(pkm_kins::maths::round(period * 1e9) as u64);
-            }
-            state = State::Dwell;
-        } else {
-            self.advance(period, held);
+        if self.executor.substep == 0 {
+            // A fault only ends the queue: what is known is still driven to its end, at rest.
+            let _ = self.refill();
+            self.release_if_starving();
+            self.begin_period(held);
         }
+        let substeps = self.settings.substeps.max(1);
+        self.executor.substep = (self.executor.substep + 1) % substeps;
+        if !self.executor.waits {
+            self.executor.waits = self.advance(self.settings.servo_period_s / f64::from(substeps), held);
+        }
+        let mut state = if self.executor.dwells { State::Dwell } else { State::Moving };
         if self.executor.at_rest() {
             if self.executor.abort {
                 self.clear();
@@ -135,6 +138,23 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             }
         }
         self.publish(state)
+    }
+
+    /// A dwell takes whole servo periods; the last one may be cut short.
+    fn begin_period(&mut self, held: bool) {
+        let at_rest = self.executor.at_rest() && self.executor.sigma == 0.0;
+        let period_ns = pkm_kins::maths::round(self.settings.servo_period_s * 1e9) as u64;
+        let dwells = match self.nodes.front_mut() {
+            Some(node) if at_rest && node.dwell_ns > 0 => {
+                if !held {
+                    node.dwell_ns = node.dwell_ns.saturating_sub(period_ns);
+                }
+                true
+            }
+            _ => false,
+        };
+        self.executor.dwells = dwells;
+        self.executor.waits = dwells;
     }
 
     /// The open end of the last move is released when the machine would have to brake for want of it.
@@ -166,18 +186,19 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         rest <= margin
     }
 
-    /// Drives along the nodes for `time` seconds, or to the next stop.
-    fn advance(&mut self, time: f64, held: bool) {
+    /// Drives along the nodes for `time` seconds, or to the next stop. True at a stop: the machine rests there until the
+    /// next servo period, so that the servo sees the corner itself.
+    fn advance(&mut self, time: f64, held: bool) -> bool {
         let mut remaining = time;
         for _ in 0..MOST_NODES {
-            let Some(node) = self.nodes.front() else { return };
+            let Some(node) = self.nodes.front() else { return true };
             let length = node.length;
             if self.nodes.len() < 2 {
                 self.executor.x = 0.0;
-                return;
+                return true;
             }
             if !self.executor.planned && !self.plan_leg(held) {
-                return;
+                return true;
             }
             let e = &mut self.executor;
             let leg = e.leg_end - e.sigma;
@@ -190,7 +211,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                     e.sigma = (e.sigma + 0.5 * (v + speed) * remaining).min(e.leg_end);
                     e.x = speed * speed;
                 }
-                return;
+                return false;
             }
             remaining -= duration;
             e.x = e.x_end;
@@ -198,18 +219,18 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             if e.leg_end < length {
                 e.sigma = e.leg_end;
                 if e.x == 0.0 && held {
-                    return;
+                    return true;
                 }
                 continue;
             }
             e.sigma = 0.0;
             self.pass_node();
-            // At a stop the machine rests until the next tick: the servo sees the corner itself.
             if self.nodes.front().is_some_and(|node| node.stop) || self.executor.x == 0.0 {
                 self.executor.x = 0.0;
-                return;
+                return true;
             }
         }
+        false
     }
 
     fn pass_node(&mut self) {
@@ -297,6 +318,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             joint_velocity: if at_rest { Default::default() } else { motion.velocity },
             motion: piece.motion,
             s,
+            blending: matches!(piece.geometry, crate::path::Geometry::Blend(_)),
             span: piece.span,
             state,
         };

@@ -43,6 +43,8 @@ pub struct Move {
 pub struct Settings {
     /// Servo period, s.
     pub servo_period_s: f64,
+    /// Setpoints per servo period, evenly spaced: 1 in a controller, more to look between the ticks.
+    pub substeps: u32,
 }
 
 /// Why a move was not taken.
@@ -77,6 +79,8 @@ pub struct Setpoint {
     pub motion: u32,
     /// Place in that move's own geometry (0 to its length).
     pub s: f64,
+    /// On the blend after that move; `s` then runs along the blend.
+    pub blending: bool,
     /// The block.
     pub span: Span,
     /// Moving, held, ...
@@ -143,6 +147,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 joint_velocity: [0.0; pkm_kins::MAX_JOINTS],
                 motion: 0,
                 s: 0.0,
+                blending: false,
                 span: Span::default(),
                 state: State::Idle,
             },

@@ -104,6 +104,7 @@ impl Blend {
 mod tests {
     use super::super::{Arc, Line};
     use super::*;
+    use pkm_kins::maths::sqrt;
 
     const P: Tolerance = Tolerance { length_mm: 0.1, angle_rad: 0.01 };
 
@@ -118,7 +119,7 @@ mod tests {
         let (d, blend) = Blend::new(&a, &b, P).unwrap();
         assert!((d - 0.4 / 2f64.sqrt()).abs() < 1e-12, "{d}");
         let mid = blend.at(d).position;
-        let off = ((mid[0] - 10.0).powi(2) + mid[1].powi(2)).sqrt();
+        let off = sqrt((mid[0] - 10.0) * (mid[0] - 10.0) + mid[1] * mid[1]);
         assert!((off - 0.1).abs() < 1e-12, "{off}");
         let end = blend.at(2.0 * d);
         assert!((end.first[1] - 1.0).abs() < 1e-12 && end.first[0].abs() < 1e-12);
