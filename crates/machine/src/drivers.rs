@@ -10,6 +10,8 @@
 //! | DM542   | Leadshine DM542 manual: pulse high and low 2.5 µs, DIR setup 5 µs; no hold is stated, 5 µs taken |
 //! | TB6600  | boxes named TB6600 differ by maker; the slowest usual figures: 5 µs, 5 µs, 20 µs, 20 µs   |
 
+use pkm_stepgen::PulseTimingNs;
+
 /// Step and direction times, ns: either the minima of a driver or what a machine file configures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StepTiming {
@@ -37,6 +39,16 @@ impl StepTiming {
         }
     }
 
+    /// The same for the step generator.
+    pub const fn pulses(self) -> PulseTimingNs {
+        PulseTimingNs {
+            step_length: self.step_length_ns,
+            step_space: self.step_space_ns,
+            dir_setup: self.direction_setup_ns,
+            dir_hold: self.direction_hold_ns,
+        }
+    }
+
     /// Shortest time from one pulse to the next, ns.
     pub const fn shortest_pulse_interval_ns(self) -> u64 {
         self.step_length_ns + self.step_space_ns
@@ -50,6 +62,13 @@ pub struct DriverTiming {
     pub model: String,
     /// The minima, ns.
     pub minimum: StepTiming,
+}
+
+impl DriverTiming {
+    /// The minima for the step generator.
+    pub const fn pulses(&self) -> PulseTimingNs {
+        self.minimum.pulses()
+    }
 }
 
 /// The drivers whose data sheets are known here.
