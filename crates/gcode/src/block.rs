@@ -1,0 +1,413 @@
+//! A block: the words of one line, read and checked but not yet executed.
+
+use crate::error::{Code, Error, ErrorKind};
+use crate::expression::{self, Reference, Scope};
+use crate::lexer::{self, Fault, Rest, fault, fault_here, into_fault};
+use crate::line::Line;
+use crate::modal::*;
+use heapless::Vec;
+use pkm_canon::{FileId, Span};
+use pkm_kins::{Axis, AxisSet};
+
+/// Number of words: the letters, `$`, `@`, `^`.
+const WORDS: usize = 29;
+/// Most M words in a block.
+const MAX_M: u8 = 4;
+/// Most parameter settings in a block; a line has room for fewer.
+const MAX_SETTINGS: usize = 64;
+/// Most comments in a block; a line has room for fewer.
+const MAX_COMMENTS: usize = 128;
+
+/// Place of a word: by letter, then `$ @ ^`.
+const fn place(letter: u8) -> usize {
+    match letter {
+        b'$' => 26,
+        b'@' => 27,
+        b'^' => 28,
+        letter => (letter.wrapping_sub(b'A') as usize) % 26,
+    }
+}
+
+/// A stretch of the raw line.
+type Stretch = (u8, u8);
+
+/// `#1=2` or `#<a>=2`, to be stored after the whole block was read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Setting {
+    Number {
+        index: i32,
+        value: f64,
+    },
+    /// The name as a stretch of [`Line::code`].
+    Name {
+        start: u8,
+        end: u8,
+        value: f64,
+        at: Stretch,
+    },
+}
+
+/// One block.
+#[derive(Debug, Clone)]
+pub(crate) struct Block {
+    words: [f64; WORDS],
+    present: u32,
+    stretches: [Stretch; WORDS],
+    g: [GCode; G_GROUPS],
+    g_stretches: [Stretch; G_GROUPS],
+    m: [i16; M_GROUPS],
+    m_stretches: [Stretch; M_GROUPS],
+    m_count: u8,
+    pub(crate) settings: Vec<Setting, MAX_SETTINGS>,
+    /// Stretches of [`Line::code`] between the parentheses.
+    pub(crate) comments: Vec<Stretch, MAX_COMMENTS>,
+    /// The group-1 code in force for this block.
+    pub(crate) motion: Option<GCode>,
+    file: FileId,
+    line: u32,
+    whole: Span,
+}
+
+impl Block {
+    pub(crate) const fn new() -> Self {
+        Self {
+            words: [0.0; WORDS],
+            present: 0,
+            stretches: [(0, 0); WORDS],
+            g: [-1; G_GROUPS],
+            g_stretches: [(0, 0); G_GROUPS],
+            m: [-1; M_GROUPS],
+            m_stretches: [(0, 0); M_GROUPS],
+            m_count: 0,
+            settings: Vec::new(),
+            comments: Vec::new(),
+            motion: None,
+            file: FileId(0),
+            line: 0,
+            whole: Span::new(FileId(0), 0, 0, 0),
+        }
+    }
+
+    fn clear(&mut self, line: &Line) {
+        self.present = 0;
+        self.g = [-1; G_GROUPS];
+        self.m = [-1; M_GROUPS];
+        self.m_count = 0;
+        self.settings.clear();
+        self.comments.clear();
+        self.motion = None;
+        (self.file, self.line, self.whole) = (line.file, line.number, line.whole());
+    }
+
+    pub(crate) fn has(&self, letter: u8) -> bool {
+        self.present & (1 << place(letter)) != 0
+    }
+
+    /// The value of a word, if it is there.
+    pub(crate) fn get(&self, letter: u8) -> Option<f64> {
+        self.has(letter).then(|| self.words[place(letter)])
+    }
+
+    /// The value of an axis word.
+    pub(crate) fn axis(&self, axis: usize) -> Option<f64> {
+        self.get(AXIS_LETTERS[axis])
+    }
+
+    /// Rescales a word that is there (G7, G8 and units on the switching block).
+    pub(crate) fn scale(&mut self, letter: u8, factor: f64) {
+        self.words[place(letter)] *= factor;
+    }
+
+    pub(crate) fn has_any(&self, letters: &[u8]) -> bool {
+        letters.iter().any(|&letter| self.has(letter))
+    }
+
+    /// True if one of X to W is there.
+    pub(crate) fn has_axis(&self) -> bool {
+        self.has_any(&AXIS_LETTERS)
+    }
+
+    pub(crate) fn has_polar(&self) -> bool {
+        self.has(b'@') || self.has(b'^')
+    }
+
+    /// The code of a group.
+    pub(crate) fn g(&self, group: GGroup) -> Option<GCode> {
+        let code = self.g[group as usize];
+        (code >= 0).then_some(code)
+    }
+
+    /// The code of a group.
+    pub(crate) fn m(&self, group: MGroup) -> Option<i32> {
+        let number = self.m[group as usize];
+        (number >= 0).then_some(number.into())
+    }
+
+    /// True if the block holds an M code at all.
+    pub(crate) fn has_m(&self, number: i32) -> bool {
+        MGroup::of(number).is_some_and(|group| self.m(group) == Some(number))
+    }
+
+    /// The whole block.
+    pub(crate) fn span(&self) -> Span {
+        self.whole
+    }
+
+    fn stretch(&self, (start, end): Stretch) -> Span {
+        Span::new(self.file, self.line, start.into(), end.into())
+    }
+
+    /// The word of a letter; the whole block if it is not there.
+    pub(crate) fn word_span(&self, letter: u8) -> Span {
+        if self.has(letter) { self.stretch(self.stretches[place(letter)]) } else { self.whole }
+    }
+
+    /// The G word of a group; the whole block if it is not there.
+    pub(crate) fn g_span(&self, group: GGroup) -> Span {
+        if self.g(group).is_some() { self.stretch(self.g_stretches[group as usize]) } else { self.whole }
+    }
+
+    /// The M word of a group; the whole block if it is not there.
+    pub(crate) fn m_span(&self, group: MGroup) -> Span {
+        if self.m(group).is_some() { self.stretch(self.m_stretches[group as usize]) } else { self.whole }
+    }
+
+    /// An error that underlines a word.
+    pub(crate) fn word_error(&self, letter: u8, kind: ErrorKind) -> Error {
+        Error { kind, span: self.word_span(letter) }
+    }
+
+    /// An error that underlines the motion code, or the whole block where it is implied.
+    pub(crate) fn motion_error(&self, kind: ErrorKind) -> Error {
+        self.g_error(GGroup::Motion, kind)
+    }
+
+    /// An error that underlines the G word of a group.
+    pub(crate) fn g_error(&self, group: GGroup, kind: ErrorKind) -> Error {
+        Error { kind, span: self.g_span(group) }
+    }
+
+    /// An error that underlines the M word of a group.
+    pub(crate) fn m_error(&self, group: MGroup, kind: ErrorKind) -> Error {
+        Error { kind, span: self.m_span(group) }
+    }
+
+    /// Reads the words of a prepared line from byte `start` on.
+    pub(crate) fn read(
+        &mut self,
+        line: &Line,
+        start: usize,
+        scope: &impl Scope,
+        reader: &Reader,
+    ) -> Result<(), Error> {
+        self.clear(line);
+        let code = line.code();
+        let mut rest = &code[start.min(code.len())..];
+        while let Some(&letter) = rest.first() {
+            rest = self
+                .item(line, letter, rest, scope, reader)
+                .map_err(|error| fault_error(line, into_fault(error)))?;
+        }
+        Ok(())
+    }
+
+    /// One word, parameter setting or comment.
+    fn item<'a>(
+        &mut self,
+        line: &Line,
+        letter: u8,
+        input: Rest<'a>,
+        scope: &impl Scope,
+        reader: &Reader,
+    ) -> Result<Rest<'a>, nom::Err<Fault>> {
+        let offset = |rest: Rest<'_>| line.code().len() - rest.len();
+        match letter {
+            b'(' => {
+                let (rest, text) = lexer::comment(input)?;
+                let begin = offset(input) + 1;
+                let _ = self.comments.push((begin as u8, (begin + text.len()) as u8));
+                return Ok(rest);
+            }
+            b'#' => return self.setting(line, input, scope),
+            _ => {}
+        }
+        let after = &input[1..];
+        let upper = letter.to_ascii_uppercase();
+        match letter {
+            b'g' => {
+                let (rest, value) = expression::value(after, scope)?;
+                let code = g_code(value).map_err(|kind| fault(kind, input, rest))?;
+                self.add_g(line, code, input, rest)?;
+                Ok(rest)
+            }
+            b'm' => {
+                let (rest, number) = expression::integer(after, scope)?;
+                self.add_m(line, number, input, rest)?;
+                Ok(rest)
+            }
+            b'n' | b'o' => Err(fault_here(ErrorKind::BadLetter { letter: upper.into() }, input)),
+            b'a'..=b'z' | b'$' | b'@' | b'^' => {
+                if let Some(axis) = AXIS_LETTERS.iter().position(|&l| l == upper)
+                    && !reader.axes.contains(Axis::ALL[axis])
+                {
+                    return Err(fault_here(ErrorKind::AxisUnavailable { letter: upper.into() }, input));
+                }
+                if self.has(upper) {
+                    return Err(fault_here(ErrorKind::WordRepeated { letter: upper.into() }, input));
+                }
+                let (rest, value) = match letter {
+                    b'h' | b'l' | b't' | b'$' => {
+                        let (rest, value) = expression::integer(after, scope)?;
+                        (rest, value.into())
+                    }
+                    _ => expression::value(after, scope)?,
+                };
+                let value = reader.check(upper, value).map_err(|kind| fault(kind, input, rest))?;
+                self.present |= 1 << place(upper);
+                self.words[place(upper)] = value;
+                self.stretches[place(upper)] = stretch(line, input, rest);
+                Ok(rest)
+            }
+            33..=126 => Err(fault_here(ErrorKind::BadLetter { letter: letter.into() }, input)),
+            byte => Err(fault_here(ErrorKind::BadChar { byte }, input)),
+        }
+    }
+
+    fn setting<'a>(
+        &mut self,
+        line: &Line,
+        input: Rest<'a>,
+        scope: &impl Scope,
+    ) -> Result<Rest<'a>, nom::Err<Fault>> {
+        let (rest, reference) = expression::reference(input, scope, 0)?;
+        let target_end = rest;
+        let (rest, ()) =
+            lexer::byte(b'=')(rest).map_err(|_| fault(ErrorKind::EqualMissing, input, target_end))?;
+        let (rest, value) = expression::value(rest, scope)?;
+        let setting = match reference {
+            Reference::Number(index) if crate::parameters::is_readonly(index) => {
+                return Err(fault(ErrorKind::ParamReadonly { index }, input, target_end));
+            }
+            Reference::Number(index) => Setting::Number { index, value },
+            Reference::Name(name) => {
+                let end = line.code().len() - target_end.len() - 1;
+                Setting::Name {
+                    start: (end - name.len()) as u8,
+                    end: end as u8,
+                    value,
+                    at: stretch(line, input, target_end),
+                }
+            }
+        };
+        let limit = MAX_SETTINGS as u8;
+        self.settings
+            .push(setting)
+            .map_err(|_| fault(ErrorKind::TooManySettings { limit }, input, target_end))?;
+        Ok(rest)
+    }
+
+    fn add_g(
+        &mut self,
+        line: &Line,
+        code: GCode,
+        from: Rest<'_>,
+        to: Rest<'_>,
+    ) -> Result<(), nom::Err<Fault>> {
+        let group =
+            GGroup::of(code).ok_or_else(|| fault(ErrorKind::GUnknown { code: Code(code) }, from, to))?;
+        let slot = &mut self.g[group as usize];
+        // G80 may share a block with another motion code and loses.
+        if *slot >= 0 && code == G80 {
+            return Ok(());
+        }
+        if *slot >= 0 && *slot != G80 {
+            let kind = ErrorKind::ModalClashG { first: Code(*slot), second: Code(code), group: group.name() };
+            return Err(fault(kind, from, to));
+        }
+        *slot = code;
+        self.g_stretches[group as usize] = stretch(line, from, to);
+        Ok(())
+    }
+
+    fn add_m(
+        &mut self,
+        line: &Line,
+        number: i32,
+        from: Rest<'_>,
+        to: Rest<'_>,
+    ) -> Result<(), nom::Err<Fault>> {
+        let group = MGroup::of(number).ok_or_else(|| fault(ErrorKind::MUnknown { number }, from, to))?;
+        let slot = &mut self.m[group as usize];
+        if *slot >= 0 {
+            let kind = ErrorKind::ModalClashM { first: (*slot).into(), second: number, group: group.name() };
+            return Err(fault(kind, from, to));
+        }
+        *slot = number as i16;
+        self.m_stretches[group as usize] = stretch(line, from, to);
+        self.m_count += 1;
+        if self.m_count > MAX_M {
+            return Err(fault(ErrorKind::MTooMany { limit: MAX_M }, from, to));
+        }
+        Ok(())
+    }
+
+    /// The span of a parameter setting's target.
+    pub(crate) fn setting_span(&self, at: Stretch) -> Span {
+        self.stretch(at)
+    }
+}
+
+/// The axis letters in order.
+pub(crate) const AXIS_LETTERS: [u8; 9] = *b"XYZABCUVW";
+
+/// What reading a block depends on besides parameters.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Reader {
+    pub(crate) axes: AxisSet,
+    /// X words are diameters (G7).
+    pub(crate) diameter: bool,
+    pub(crate) spindles: u8,
+}
+
+impl Reader {
+    /// Range checks that hold for a letter wherever it is used.
+    fn check(&self, letter: u8, value: f64) -> Result<f64, ErrorKind> {
+        match letter {
+            b'F' if value < 0.0 => Err(ErrorKind::NegativeF { value }),
+            b'S' if value < 0.0 => Err(ErrorKind::NegativeS { value }),
+            b'$' if value < -1.0 || value >= self.spindles.into() => {
+                Err(ErrorKind::SpindleNumber { value, last: self.spindles.saturating_sub(1) })
+            }
+            b'L' if value < 0.0 => Err(ErrorKind::NegativeWord { letter: letter.into(), value }),
+            b'H' if value < -1.0 => Err(ErrorKind::NegativeWord { letter: letter.into(), value }),
+            b'X' if self.diameter => Ok(value / 2.0),
+            _ => Ok(value),
+        }
+    }
+}
+
+/// A G word's value as code: within 0.001 of a tenth.
+fn g_code(value: f64) -> Result<GCode, ErrorKind> {
+    let tenths = value * 10.0;
+    let mut code = pkm_kins::maths::floor(tenths);
+    let rest = tenths - code;
+    if rest > 0.999 {
+        code += 1.0;
+    } else if rest > 0.001 {
+        return Err(ErrorKind::GRange { value });
+    }
+    if (0.0..=999.0).contains(&code) { Ok(code as GCode) } else { Err(ErrorKind::GRange { value }) }
+}
+
+fn stretch(line: &Line, from: Rest<'_>, to: Rest<'_>) -> Stretch {
+    let length = line.code().len();
+    let span = line.code_span(length - from.len(), length - to.len());
+    (span.start as u8, span.end as u8)
+}
+
+/// The error of a fault in a prepared line.
+pub(crate) fn fault_error(line: &Line, fault: Fault) -> Error {
+    let length = line.code().len();
+    let (start, end) = (length.saturating_sub(fault.begin), length.saturating_sub(fault.end));
+    Error { kind: fault.kind, span: line.code_span(start, end) }
+}

@@ -1,0 +1,110 @@
+//! The fixed order in which the words of a block take effect (RS274/NGC table 8; dialect section 7).
+
+use super::{Out, Status, state::State};
+use crate::block::Block;
+use crate::error::{Code, Error, ErrorKind};
+use crate::line::Line;
+use crate::modal::*;
+use pkm_canon::Canon;
+
+impl State {
+    /// Executes a complete block.
+    pub(crate) fn execute(
+        &mut self,
+        block: &mut Block,
+        line: &Line,
+        out: &mut Out<'_>,
+    ) -> Result<Status, Error> {
+        self.comments(block, line, out)?;
+        self.spindle_mode(block, out)?;
+        self.feed_mode(block, out);
+        self.feed_rate(block, out);
+        self.spindle_speed(block, out);
+        self.select_tool(block, out)?;
+        let mut synch = self.input_output(block, out)?;
+        synch |= self.change_tool(block, out)?;
+        self.spindle(block, out)?;
+        self.coolant(block, out);
+        self.overrides(block, out)?;
+        if let Some(number) = block.m(MGroup::User) {
+            return Err(block.m_error(MGroup::User, ErrorKind::MUnsupported { number }));
+        }
+        if block.g(GGroup::NonModal) == Some(G4) {
+            out.emit(Canon::Dwell(block.get(b'P').unwrap_or(0.0)));
+        }
+        self.plane(block, out)?;
+        self.units(block, out);
+        self.lathe_mode(block, out);
+        self.compensation(block, out)?;
+        self.tool_length(block, out)?;
+        self.coordinate_system(block, out)?;
+        self.path_mode(block, out)?;
+        self.distance_mode(block, out);
+        self.arc_mode(block, out);
+        self.retract_mode(block, out)?;
+        self.non_modal(block, out)?;
+        if block.motion.is_some() {
+            synch |= self.motion(block, out)?;
+        }
+        if let Some(number) = block.m(MGroup::Stop) {
+            return Ok(if self.stop(number, out) {
+                Status::Ended
+            } else if synch {
+                Status::Synch
+            } else {
+                Status::Running
+            });
+        }
+        Ok(if synch { Status::Synch } else { Status::Running })
+    }
+
+    /// Groups 0 and 16: settings, offsets, home moves.
+    fn non_modal(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        match block.g(GGroup::NonModal) {
+            Some(G10) => self.set_data(block, out)?,
+            Some(code @ (G28 | G30)) => self.go_home(code, block, out)?,
+            Some(code @ (G28_1 | G30_1)) => self.store_home(code, block)?,
+            Some(G52) => self.local_offset(block, out)?,
+            Some(G92) => self.g92_set(block, out)?,
+            _ => {}
+        }
+        match block.g(GGroup::G92) {
+            Some(921) => self.g92_cancel(true, block, out),
+            Some(922) => self.g92_cancel(false, block, out),
+            Some(923) => self.g92_restore(block, out),
+            _ => Ok(()),
+        }
+    }
+
+    /// Group 1. True if the next block depends on what the machine did.
+    fn motion(&mut self, block: &Block, out: &mut Out<'_>) -> Result<bool, Error> {
+        match block.motion {
+            None => {}
+            Some(code @ (G0 | G1)) => self.straight(code, block, out)?,
+            Some(code @ (G2 | G3)) => self.arc(code, block, out)?,
+            Some(G80) => {
+                out.emit(Canon::Comment("interpreter: motion mode set to none".into()));
+                self.modal.motion = G80;
+            }
+            Some(code) => return Err(block.motion_error(ErrorKind::GUnsupported { code: Code(code) })),
+        }
+        Ok(false)
+    }
+
+    /// M0, M1, M2, M30, M60, M99. True if the program ends.
+    fn stop(&mut self, number: i32, out: &mut Out<'_>) -> bool {
+        match number {
+            0 => out.emit(Canon::ProgramStop),
+            1 => out.emit(Canon::OptionalProgramStop),
+            60 => {
+                out.emit(Canon::PalletShuttle);
+                out.emit(Canon::ProgramStop);
+            }
+            _ => {
+                self.end_program(number, out);
+                return true;
+            }
+        }
+        false
+    }
+}

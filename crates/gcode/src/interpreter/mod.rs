@@ -1,0 +1,234 @@
+//! The interpreter: one block per step, executed in RS274's fixed order, out come canonical commands.
+
+mod arcs;
+mod check;
+mod comments;
+mod end;
+mod execute;
+mod modes;
+mod motion;
+mod offsets;
+mod state;
+mod tools;
+
+use crate::block::Block;
+use crate::error::{Error, ErrorKind};
+use crate::line::Line;
+use crate::parameters::Parameters;
+use crate::settings::{Dialect, Settings};
+use crate::source::LineSource;
+use crate::tool_table::ToolTable;
+use pkm_canon::{Canon, CanonSink, Position, Span};
+use state::State;
+
+/// What a step left behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// Go on with the next step.
+    Running,
+    /// The block probed, changed the tool or read an input: the next block depends on what the machine did. A
+    /// caller with a machine lets the motion finish and tells the interpreter (see [`Interpreter::set_position`]);
+    /// without one it may go on at once.
+    Synch,
+    /// The program has ended by M2, M30, M99 or `%`; the rest of the source is not read.
+    Ended,
+}
+
+/// Takes commands and stamps them with the block they come from.
+pub(crate) struct Out<'a> {
+    sink: &'a mut dyn CanonSink,
+    span: Span,
+}
+
+impl Out<'_> {
+    pub(crate) fn emit(&mut self, command: Canon<'_>) {
+        self.sink.command(&command, self.span);
+    }
+}
+
+/// How far the program is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// Nothing was emitted.
+    New,
+    /// No block was read yet; blank lines may come.
+    Opening,
+    /// Between the first block and the end; `framed` = the program began with `%`.
+    Running { framed: bool },
+    /// After the end.
+    Ended,
+}
+
+/// An RS274/NGC interpreter: modal state, parameters, tool table.
+#[derive(Debug, Clone)]
+pub struct Interpreter {
+    state: State,
+    line: Line,
+    block: Block,
+    phase: Phase,
+}
+
+impl Interpreter {
+    /// An interpreter in its start state: G17 G21 G40 G49 G54 G80 G90 G91.1 G94 G97 G99 G8, position 0.
+    pub fn new(settings: Settings) -> Self {
+        Self { state: State::new(settings), line: Line::new(), block: Block::new(), phase: Phase::New }
+    }
+
+    /// The parameters.
+    pub fn parameters(&self) -> &Parameters {
+        &self.state.parameters
+    }
+
+    /// The parameters, to load a parameter file before the first step. What is set here about offsets and the
+    /// active coordinate system takes effect at the start.
+    pub fn parameters_mut(&mut self) -> &mut Parameters {
+        &mut self.state.parameters
+    }
+
+    /// The tool table.
+    pub fn tools(&self) -> &ToolTable {
+        &self.state.tools
+    }
+
+    /// The tool table, to fill it before the first step.
+    pub fn tools_mut(&mut self) -> &mut ToolTable {
+        &mut self.state.tools
+    }
+
+    /// The line read last, trailing blanks cut: the source text for messages.
+    pub fn source_line(&self) -> &[u8] {
+        self.line.raw()
+    }
+
+    /// Where the program believes the tool is: program coordinates, program units, degrees.
+    pub fn position(&self) -> Position {
+        Position::from_array(self.state.position)
+    }
+
+    /// Tells the interpreter where the machine stands: machine coordinates, mm and degrees, without offsets. Call
+    /// it before the first step (the program starts where the machine stands) and after [`Status::Synch`].
+    pub fn set_machine_position_mm(&mut self, position: Position) {
+        if self.phase == Phase::New {
+            self.state.take_over_parameters();
+        }
+        self.state.set_machine_position_mm(position);
+    }
+
+    /// Tells the interpreter where the tool is: program coordinates, program units, degrees.
+    pub fn set_position(&mut self, position: Position) {
+        self.state.position = position.to_array();
+    }
+
+    /// Emits what every program begins with: units, offsets, rotation. The first step does it by itself.
+    pub fn start(&mut self, sink: &mut dyn CanonSink) {
+        if self.phase != Phase::New {
+            return;
+        }
+        self.phase = Phase::Opening;
+        self.state.take_over_parameters();
+        let state = &self.state;
+        let mut out = Out { sink, span: Span::default() };
+        out.emit(Canon::UseLengthUnits(state.modal.units));
+        out.emit(state.g5x_command());
+        out.emit(state.g92_command());
+        out.emit(Canon::SetXyRotation(state.rotation_deg));
+        out.emit(Canon::SetFeedReference);
+    }
+
+    /// Reads and executes one block.
+    ///
+    /// # Errors
+    /// What is wrong with the block and where. Commands of the block that come before the error in the order of
+    /// execution have been emitted. The next step goes on with the next block.
+    pub fn step(&mut self, source: &mut dyn LineSource, sink: &mut dyn CanonSink) -> Result<Status, Error> {
+        self.start(sink);
+        if self.phase == Phase::Ended {
+            return Ok(Status::Ended);
+        }
+        let place = source.place();
+        let number = place.line + 1;
+        match source.next_line() {
+            Ok(Some(mut text)) => {
+                if self.phase == Phase::Opening && number == 1 {
+                    text = self.without_byte_order_mark(text);
+                }
+                let loaded = self.line.load(text, place.file, number);
+                sink.line_read(self.line.raw(), self.line.whole());
+                if self.phase == Phase::Opening && !self.line.raw().is_empty() {
+                    Out { sink, span: Span::default() }.emit(Canon::OnReset);
+                    let framed = self.line.raw().trim_ascii() == b"%";
+                    self.phase = Phase::Running { framed };
+                    if framed {
+                        return Ok(Status::Running);
+                    }
+                }
+                loaded?;
+            }
+            Ok(None) => return Err(self.end_of_file()),
+            Err(cause) => {
+                self.phase = Phase::Ended;
+                let span = Span::new(place.file, number, 0, 0);
+                return Err(Error { kind: ErrorKind::FileOpen { cause }, span });
+            }
+        }
+        self.execute_line(sink)
+    }
+
+    /// pkm's own dialect accepts a byte order mark before the first block.
+    fn without_byte_order_mark<'a>(&self, text: &'a [u8]) -> &'a [u8] {
+        match self.state.settings.dialect {
+            Dialect::Pkm => text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text),
+            Dialect::LinuxCnc29 | Dialect::LinuxCnc210 => text,
+        }
+    }
+
+    fn end_of_file(&mut self) -> Error {
+        let kind = match self.phase {
+            Phase::Running { framed: true } => ErrorKind::FileNoEndPercent,
+            Phase::Running { framed: false } => ErrorKind::FileNoEnd,
+            _ => ErrorKind::FileEmpty,
+        };
+        self.phase = Phase::Ended;
+        let end = self.line.raw().len();
+        Error { kind, span: self.line.span(end, end) }
+    }
+
+    fn execute_line(&mut self, sink: &mut dyn CanonSink) -> Result<Status, Error> {
+        let trimmed = self.line.raw().trim_ascii_start();
+        let framed = self.phase == Phase::Running { framed: true };
+        match trimmed {
+            [] => return Ok(Status::Running),
+            b"%" if framed => {
+                self.phase = Phase::Ended;
+                Out { sink, span: self.line.whole() }.emit(Canon::Finish);
+                return Ok(Status::Ended);
+            }
+            [b'/', ..] if self.state.settings.block_delete => return Ok(Status::Running),
+            _ => {}
+        }
+        self.line.prepare()?;
+        let start = self.line.skip_number()?;
+        self.state.source_line = self.line.number;
+        self.refuse_o_word(start)?;
+        self.block.read(&self.line, start, &self.state, &self.state.reader())?;
+        self.state.complete(&mut self.block)?;
+        let mut out = Out { sink, span: self.block.span() };
+        self.state.store_settings(&self.block, &self.line)?;
+        let status = self.state.execute(&mut self.block, &self.line, &mut out)?;
+        if status == Status::Ended {
+            if framed {
+                out.emit(Canon::Comment("interpreter: percent sign missing from end of file".into()));
+            }
+            self.phase = Phase::Ended;
+        }
+        Ok(status)
+    }
+
+    fn refuse_o_word(&self, start: usize) -> Result<(), Error> {
+        if self.line.code().get(start) == Some(&b'o') {
+            let span = self.line.code_span(start, self.line.code().len());
+            return Err(Error { kind: ErrorKind::OUnknown, span });
+        }
+        Ok(())
+    }
+}

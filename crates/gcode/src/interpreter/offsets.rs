@@ -1,0 +1,202 @@
+//! Coordinate systems and offsets: G54 to G59.3, G10, G28, G30, G52, G92. None of them moves the machine: each
+//! recomputes the program position so that the machine point stays.
+
+use super::{Out, state::State};
+use crate::block::Block;
+use crate::error::{Error, ErrorKind};
+use crate::modal::*;
+use crate::parameters::{self, system_offset};
+use pkm_canon::{Canon, Position};
+use pkm_kins::maths;
+
+impl State {
+    fn no_compensation(&self, block: &Block, group: GGroup, what: &'static str) -> Result<(), Error> {
+        match self.modal.compensation {
+            None => Ok(()),
+            Some(_) => Err(block.g_error(group, ErrorKind::CcOn { what })),
+        }
+    }
+
+    /// G54 to G59.3.
+    pub(crate) fn coordinate_system(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        let Some(code) = block.g(GGroup::System) else { return Ok(()) };
+        self.no_compensation(block, GGroup::System, "another coordinate system")?;
+        let system = match code {
+            540..=590 => i32::from(code - 530) / 10,
+            code => i32::from(code - 584),
+        };
+        if system == self.modal.system {
+            out.emit(Canon::Comment("interpreter: continuing to use same coordinate system".into()));
+            return Ok(());
+        }
+        self.parameters.set(parameters::SYSTEM, system.into());
+        self.keep_machine_point(|state| state.load_system(system));
+        out.emit(self.g5x_command());
+        out.emit(self.g92_command());
+        out.emit(Canon::SetXyRotation(self.rotation_deg));
+        Ok(())
+    }
+
+    /// Changes offsets; the program position follows so that the machine stays where it is.
+    pub(crate) fn keep_machine_point(&mut self, change: impl FnOnce(&mut Self)) {
+        let machine = self.machine_point(self.position);
+        change(self);
+        self.position = self.program_point(machine);
+    }
+
+    /// G10 L2, L20 (coordinate systems); L0, L1, L10, L11 (tool table).
+    pub(crate) fn set_data(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        let fail = |kind| Err(block.g_error(GGroup::NonModal, kind));
+        match block.get(b'L').map(|l| l as i32) {
+            None => fail(ErrorKind::OffsetLMissing),
+            Some(l @ (2 | 20)) => self.set_system(l, block, out),
+            Some(l @ (0 | 1 | 10 | 11)) => self.set_tool_data(l, block, out),
+            Some(l) => Err(block.word_error(b'L', ErrorKind::OffsetL { value: l.into() })),
+        }
+    }
+
+    fn set_system(&mut self, l: i32, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        let p = block.get(b'P').unwrap_or(-1.0);
+        let system = maths::round(p);
+        if (p - system).abs() > 0.0001 || !(0.0..=9.0).contains(&system) {
+            return Err(block.word_error(b'P', ErrorKind::OffsetP { value: p, first: 0, last: 9 }));
+        }
+        let system = if system == 0.0 { self.modal.system } else { system as i32 };
+        let refused: &[u8] = if l == 20 { b"IJR" } else { b"IJ" };
+        if let Some(letter) = refused.iter().copied().find(|letter| block.has(*letter)) {
+            return Err(block.word_error(letter, ErrorKind::OffsetWord { letter: letter.into(), l }));
+        }
+        let active = system == self.modal.system;
+        if active {
+            self.no_compensation(block, GGroup::NonModal, "G10 of the active coordinate system")?;
+        }
+        let first = system_offset(system);
+        let mut offset = self.program_units(self.parameters.nine(first));
+        let rotation = match block.get(b'R') {
+            Some(degrees) => degrees,
+            None => self.parameters.get(first + 9),
+        };
+        match l {
+            2 => {
+                for (axis, offset) in offset.iter_mut().enumerate() {
+                    *offset = block.axis(axis).unwrap_or(*offset);
+                }
+            }
+            _ => self.offset_for_reading(block, rotation, &mut offset),
+        }
+        let kept = self.parameters.nine(first);
+        let mut stored = self.machine_units(offset);
+        for axis in 0..9 {
+            if block.axis(axis).is_none() {
+                stored[axis] = kept[axis];
+            }
+        }
+        self.parameters.set_nine(first, &stored);
+        self.parameters.set(first + 9, rotation);
+        if active {
+            self.keep_machine_point(|state| {
+                state.g5x = offset;
+                state.rotation_deg = rotation;
+            });
+            out.emit(self.g5x_command());
+            out.emit(Canon::SetXyRotation(self.rotation_deg));
+        } else {
+            out.emit(Canon::Comment("interpreter: setting coordinate system origin".into()));
+        }
+        Ok(())
+    }
+
+    /// G10 L20: machine = R (p + g92) + offset + tool with p as wanted, so the offset follows.
+    fn offset_for_reading(&self, block: &Block, rotation_deg: f64, offset: &mut [f64; 9]) {
+        let machine = self.machine_point(self.position);
+        let mut wanted: [f64; 9] =
+            core::array::from_fn(|axis| block.axis(axis).unwrap_or(self.position[axis]) + self.g92[axis]);
+        super::state::rotate(&mut wanted, rotation_deg);
+        for axis in (0..9).filter(|axis| block.axis(*axis).is_some()) {
+            offset[axis] = machine[axis] - self.tool_offset[axis] - wanted[axis];
+        }
+    }
+
+    /// G28, G30: by the programmed point to the stored machine point.
+    pub(crate) fn go_home(&mut self, code: GCode, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        self.no_compensation(block, GGroup::NonModal, "a move to the stored position")?;
+        let by = self.end_point(block)?;
+        out.emit(Canon::StraightTraverse(Position::from_array(by)));
+        let first = if code == G28 { parameters::G28_HOME } else { parameters::G30_HOME };
+        let home = self.program_point(self.program_units(self.parameters.nine(first)));
+        let all = !block.has_axis();
+        let end = core::array::from_fn(
+            |axis| {
+                if all || block.axis(axis).is_some() { home[axis] } else { by[axis] }
+            },
+        );
+        self.position = end;
+        out.emit(Canon::StraightTraverse(Position::from_array(end)));
+        Ok(())
+    }
+
+    /// G28.1, G30.1: stores the machine point.
+    pub(crate) fn store_home(&mut self, code: GCode, block: &Block) -> Result<(), Error> {
+        self.no_compensation(block, GGroup::NonModal, "storing the position")?;
+        let first = if code == G28_1 { parameters::G28_HOME } else { parameters::G30_HOME };
+        let machine = self.machine_units(self.machine_point(self.position));
+        self.parameters.set_nine(first, &machine);
+        Ok(())
+    }
+
+    fn store_g92(&mut self, applied: bool) {
+        let stored = self.machine_units(self.g92);
+        self.parameters.set_nine(parameters::G92_OFFSET, &stored);
+        self.parameters.set(parameters::G92_APPLIED, applied.into());
+    }
+
+    /// G92: the present point reads the given values.
+    pub(crate) fn g92_set(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        self.no_compensation(block, GGroup::NonModal, "G92")?;
+        for axis in 0..9 {
+            if let Some(value) = block.axis(axis) {
+                self.g92[axis] += self.position[axis] - value;
+                self.position[axis] = value;
+            }
+        }
+        self.store_g92(true);
+        out.emit(self.g92_command());
+        Ok(())
+    }
+
+    /// G52: a local offset; it shares its storage with G92.
+    pub(crate) fn local_offset(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        self.no_compensation(block, GGroup::NonModal, "G52")?;
+        for axis in 0..9 {
+            if let Some(value) = block.axis(axis) {
+                self.position[axis] += self.g92[axis] - value;
+                self.g92[axis] = value;
+            }
+        }
+        self.store_g92(true);
+        out.emit(self.g92_command());
+        Ok(())
+    }
+
+    /// G92.1 (forgets the stored offset), G92.2 (keeps it).
+    pub(crate) fn g92_cancel(&mut self, forget: bool, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        self.no_compensation(block, GGroup::G92, "G92.1 or G92.2")?;
+        self.keep_machine_point(|state| state.g92 = [0.0; 9]);
+        self.parameters.set(parameters::G92_APPLIED, 0.0);
+        if forget {
+            self.store_g92(false);
+        }
+        out.emit(self.g92_command());
+        Ok(())
+    }
+
+    /// G92.3: the stored offset back.
+    pub(crate) fn g92_restore(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        self.no_compensation(block, GGroup::G92, "G92.3")?;
+        let stored = self.program_units(self.parameters.nine(parameters::G92_OFFSET));
+        self.keep_machine_point(|state| state.g92 = stored);
+        self.parameters.set(parameters::G92_APPLIED, 1.0);
+        out.emit(self.g92_command());
+        Ok(())
+    }
+}

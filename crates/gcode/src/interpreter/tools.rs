@@ -1,0 +1,198 @@
+//! Tools: T, M6, M61, tool length offsets (G43, G43.1, G43.2, G49), tool table settings (G10 L1, L10, L11).
+
+use super::{Out, state::State};
+use crate::block::Block;
+use crate::error::{Error, ErrorKind};
+use crate::modal::*;
+use crate::settings::Dialect;
+use pkm_canon::{Canon, Position, Tool};
+use pkm_kins::maths;
+
+impl State {
+    /// T.
+    pub(crate) fn select_tool(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        let Some(number) = block.get(b'T').map(|t| t as i32) else { return Ok(()) };
+        let slot = self.tools.slot(number);
+        let Some(slot) = slot else {
+            return Err(block.word_error(b'T', ErrorKind::ToolUnknown { number }));
+        };
+        self.modal.selected_slot = slot;
+        self.modal.selected_tool = number;
+        out.emit(Canon::SelectTool(number));
+        Ok(())
+    }
+
+    /// M6, M61. True if the tool changes.
+    pub(crate) fn change_tool(&mut self, block: &Block, out: &mut Out<'_>) -> Result<bool, Error> {
+        match block.m(MGroup::Tool) {
+            Some(6) => {
+                if self.modal.compensation.is_some() {
+                    return Err(block.m_error(MGroup::Tool, ErrorKind::CcOn { what: "a tool change" }));
+                }
+                if self.modal.selected_slot < 0 {
+                    return Err(block.m_error(MGroup::Tool, ErrorKind::ToolMissing));
+                }
+                if self.settings.dialect == Dialect::LinuxCnc29 {
+                    out.emit(Canon::StartChange);
+                }
+                for spindle in 0..self.settings.spindles.min(8) {
+                    self.modal.spindles[usize::from(spindle)].turning = None;
+                    out.emit(Canon::StopSpindle { spindle: spindle.into() });
+                }
+                let (slot, tool) = (self.modal.selected_slot, self.modal.selected_tool);
+                out.emit(Canon::ChangeTool { slot, tool });
+                self.tools.load_spindle(slot);
+                Ok(true)
+            }
+            Some(number) => {
+                let Some(q) = block.get(b'Q') else {
+                    let kind = ErrorKind::WordMissingM { letter: 'Q', number };
+                    return Err(block.m_error(MGroup::Tool, kind));
+                };
+                let tool = maths::round(q);
+                if (q - tool).abs() > 0.0001 {
+                    return Err(block.word_error(b'Q', ErrorKind::NotInteger { value: q }));
+                }
+                let tool = tool as i32;
+                let slot = if tool < 0 { None } else { self.tools.slot(tool) };
+                let Some(slot) = slot else {
+                    return Err(block.word_error(b'Q', ErrorKind::ToolUnknown { number: tool }));
+                };
+                out.emit(Canon::ChangeToolNumber { slot, tool });
+                self.tools.load_spindle(slot);
+                Ok(true)
+            }
+            None => Ok(false),
+        }
+    }
+
+    /// The tool of a number word; 0 is the tool in the spindle.
+    fn tool_of(&self, block: &Block, letter: u8, number: i32) -> Result<Tool, Error> {
+        let slot = self.tools.slot(number);
+        slot.and_then(|slot| self.tools.get(slot))
+            .copied()
+            .ok_or_else(|| block.word_error(letter, ErrorKind::ToolUnknown { number }))
+    }
+
+    /// G43, G43.1, G43.2, G49.
+    pub(crate) fn tool_length(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        let Some(code) = block.g(GGroup::ToolLength) else { return Ok(()) };
+        if self.modal.compensation.is_some() {
+            return Err(block.g_error(GGroup::ToolLength, ErrorKind::CcOn { what: "a tool length offset" }));
+        }
+        let named = |present: [f64; 9]| -> [f64; 9] {
+            core::array::from_fn(|axis| block.axis(axis).unwrap_or(present[axis]))
+        };
+        let tool_row = |state: &Self| -> Result<[f64; 9], Error> {
+            let number = block.get(b'H').unwrap_or(0.0) as i32;
+            let tool = state.tool_of(block, b'H', number)?;
+            Ok(state.program_units(tool.offset.to_array()))
+        };
+        let offset = match code {
+            G43 => tool_row(self)?,
+            G43_1 => named(self.tool_offset),
+            G43_2 => {
+                let words = block.has_axis();
+                if block.has(b'H') == words {
+                    let kind = ErrorKind::WordMissing { letter: 'H', code: crate::error::Code(code) };
+                    return Err(block.g_error(GGroup::ToolLength, kind));
+                }
+                let added = if words { named([0.0; 9]) } else { tool_row(self)? };
+                core::array::from_fn(|axis| self.tool_offset[axis] + added[axis])
+            }
+            _ => [0.0; 9],
+        };
+        self.keep_machine_point(|state| state.tool_offset = offset);
+        out.emit(Canon::UseToolLengthOffset(Position::from_array(offset)));
+        Ok(())
+    }
+
+    /// G10 L0, L1, L10, L11.
+    pub(crate) fn set_tool_data(&mut self, l: i32, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        if l == 0 {
+            if self.tools.get(0).is_some_and(|tool| tool.number > 0) {
+                return Err(block.g_error(GGroup::NonModal, ErrorKind::ToolLoaded));
+            }
+            out.emit(Canon::ReloadTooldata);
+            return Ok(());
+        }
+        let p = block.get(b'P').unwrap_or(-1.0);
+        let number = maths::round(p);
+        let range = ErrorKind::OffsetP { value: p, first: 1, last: i32::MAX };
+        if (p - number).abs() > 0.0001 || number < 1.0 {
+            return Err(block.word_error(b'P', range));
+        }
+        let number = number as i32;
+        let Some(slot) = self.tools.slot(number) else {
+            return Err(block.word_error(b'P', ErrorKind::ToolUnknown { number }));
+        };
+        let Some(mut tool) = self.tools.get(slot).copied() else {
+            return Err(block.word_error(b'P', ErrorKind::ToolUnknown { number }));
+        };
+        self.change_tool_row(l, &mut tool, block)?;
+        if let Some(row) = self.tools.get_mut(slot) {
+            *row = tool;
+        }
+        out.emit(Canon::SetToolTableEntry { slot, tool: &tool });
+        let loaded = self.tools.get(0).is_some_and(|spindle| spindle.number == number);
+        if loaded {
+            self.tools.load_spindle(slot);
+            out.emit(Canon::SetToolTableEntry { slot: 0, tool: &tool });
+        }
+        Ok(())
+    }
+
+    /// The words of G10 L1, L10, L11 into a row.
+    fn change_tool_row(&self, l: i32, tool: &mut Tool, block: &Block) -> Result<(), Error> {
+        let mut offset = tool.offset.to_array();
+        let values: [Option<f64>; 9] = match l {
+            1 => core::array::from_fn(|axis| block.axis(axis)),
+            _ => self.tool_offset_for_reading(l, block),
+        };
+        for axis in 0..9 {
+            if let Some(value) = values[axis] {
+                offset[axis] = if super::state::is_length(axis) {
+                    self.settings.machine_length(value, self.modal.units)
+                } else {
+                    value
+                };
+            }
+        }
+        tool.offset = Position::from_array(offset);
+        if let Some(radius) = block.get(b'R') {
+            tool.diameter = self.settings.machine_length(radius, self.modal.units) * 2.0;
+        }
+        if let Some(angle) = block.get(b'I') {
+            tool.front_angle = angle;
+        }
+        if let Some(angle) = block.get(b'J') {
+            tool.back_angle = angle;
+        }
+        if let Some(q) = block.get(b'Q') {
+            let orientation = maths::round(q);
+            if (q - orientation).abs() > 0.0001 || !(0.0..=9.0).contains(&orientation) {
+                return Err(block.word_error(b'Q', ErrorKind::CcTool { value: q }));
+            }
+            tool.orientation = orientation as i32;
+        }
+        Ok(())
+    }
+
+    /// L10: the tool offset with which the present point reads the given values in the active system; L11: in
+    /// G59.3, without G92.
+    fn tool_offset_for_reading(&self, l: i32, block: &Block) -> [Option<f64>; 9] {
+        let machine = self.machine_point(self.position);
+        let (system, rotation, g92) = match l {
+            10 => (self.g5x, self.rotation_deg, self.g92),
+            _ => {
+                let first = crate::parameters::system_offset(9);
+                let offset = self.program_units(self.parameters.nine(first));
+                (offset, self.parameters.get(first + 9), [0.0; 9])
+            }
+        };
+        let mut wanted: [f64; 9] =
+            core::array::from_fn(|axis| block.axis(axis).unwrap_or(self.position[axis]) + g92[axis]);
+        super::state::rotate(&mut wanted, rotation);
+        core::array::from_fn(|axis| block.axis(axis).map(|_| machine[axis] - system[axis] - wanted[axis]))
+    }
+}

@@ -1,0 +1,134 @@
+//! Numbered and named parameters (RS274/NGC 3.2.1; LinuxCNC's named and predefined ones).
+
+use crate::error::ErrorKind;
+use crate::expression::LAST_PARAMETER;
+#[cfg(feature = "alloc")]
+use alloc::{boxed::Box, collections::BTreeMap, vec::Vec};
+
+const COUNT: usize = LAST_PARAMETER as usize + 1;
+
+/// First of the nine G28 coordinates, machine units.
+pub(crate) const G28_HOME: i32 = 5161;
+/// First of the nine G30 coordinates, machine units.
+pub(crate) const G30_HOME: i32 = 5181;
+/// 1 while a G52 or G92 offset is applied.
+pub(crate) const G92_APPLIED: i32 = 5210;
+/// First of the nine G52/G92 offsets, machine units.
+pub(crate) const G92_OFFSET: i32 = 5211;
+/// Active coordinate system, 1 to 9.
+pub(crate) const SYSTEM: i32 = 5220;
+/// Result of M66.
+pub(crate) const INPUT: i32 = 5399;
+
+/// First of the nine offsets of coordinate system 1 to 9; the rotation follows them.
+pub(crate) const fn system_offset(system: i32) -> i32 {
+    5201 + 20 * system
+}
+
+/// Parameters with a meaning that only the interpreter may set.
+pub(crate) const fn is_readonly(index: i32) -> bool {
+    matches!(index, 5021..=5029 | 5081..=5089 | 5400..=5413 | 5420..=5428)
+}
+
+/// Parameters that the parameter file keeps.
+pub(crate) const fn is_persistent(index: i32) -> bool {
+    matches!(index, 5161..=5169 | 5181..=5189 | 5210..=5230)
+        || (index >= 5241 && index <= 5390 && matches!((index - 5221) % 20, 0..=9))
+}
+
+/// All parameters of a program.
+#[derive(Debug, Clone)]
+pub struct Parameters {
+    numbered: [f64; COUNT],
+    #[cfg(feature = "alloc")]
+    globals: BTreeMap<Box<[u8]>, f64>,
+    /// One map per call level; the last is the present one.
+    #[cfg(feature = "alloc")]
+    locals: Vec<BTreeMap<Box<[u8]>, f64>>,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        let mut numbered = [0.0; COUNT];
+        numbered[SYSTEM as usize] = 1.0;
+        numbered[5599] = 1.0;
+        Self {
+            numbered,
+            #[cfg(feature = "alloc")]
+            globals: BTreeMap::new(),
+            #[cfg(feature = "alloc")]
+            locals: Vec::from([BTreeMap::new()]),
+        }
+    }
+}
+
+impl Parameters {
+    /// `#index`; 0 outside 1 to 5601.
+    pub fn get(&self, index: i32) -> f64 {
+        usize::try_from(index).ok().and_then(|i| self.numbered.get(i)).copied().unwrap_or(0.0)
+    }
+
+    /// Sets `#index`, read-only ones too; nothing happens outside 1 to 5601.
+    pub fn set(&mut self, index: i32, value: f64) {
+        if let Some(place) = usize::try_from(index).ok().and_then(|i| self.numbered.get_mut(i)) {
+            *place = value;
+        }
+    }
+
+    /// Nine values in a row.
+    pub(crate) fn nine(&self, first: i32) -> [f64; 9] {
+        core::array::from_fn(|i| self.get(first + i as i32))
+    }
+
+    pub(crate) fn set_nine(&mut self, first: i32, values: &[f64; 9]) {
+        for (i, value) in values.iter().enumerate() {
+            self.set(first + i as i32, *value);
+        }
+    }
+
+    /// `#<name>` as the program sees it: names that begin with `_` are global.
+    #[cfg(feature = "alloc")]
+    pub fn named(&self, name: &[u8]) -> Option<f64> {
+        let map = if name.first() == Some(&b'_') { &self.globals } else { self.locals.last()? };
+        map.get(name).copied()
+    }
+
+    #[cfg(not(feature = "alloc"))]
+    pub(crate) fn named(&self, _: &[u8]) -> Option<f64> {
+        None
+    }
+
+    /// Sets or creates `#<name>`.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn set_named(&mut self, name: &[u8], value: f64) -> Result<(), ErrorKind> {
+        let map = if name.first() == Some(&b'_') {
+            &mut self.globals
+        } else {
+            self.locals.last_mut().ok_or(ErrorKind::ParamNoMemory)?
+        };
+        match map.get_mut(name) {
+            Some(place) => *place = value,
+            None => drop(map.insert(name.into(), value)),
+        }
+        Ok(())
+    }
+
+    #[cfg(not(feature = "alloc"))]
+    pub(crate) fn set_named(&mut self, _: &[u8], _: f64) -> Result<(), ErrorKind> {
+        Err(ErrorKind::ParamNoMemory)
+    }
+
+    /// A sub begins: its own names.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn enter(&mut self) {
+        self.locals.push(BTreeMap::new());
+    }
+
+    /// A sub ends: its names are forgotten.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn leave(&mut self) {
+        if self.locals.len() > 1 {
+            self.locals.pop();
+        }
+    }
+}
