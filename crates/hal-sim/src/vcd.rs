@@ -15,7 +15,7 @@ use vcd::{Command, IdCode, TimescaleUnit};
 pub struct VcdWriter<W: Write> {
     out: Output<W>,
     /// Text of a falling and a rising edge, per joint: direction, step.
-    changes: Vec<[[Box<[u8]>; 2]; 2]>,
+    changes: Vec<[[[u8; 3]; 2]; 2]>,
     /// VCD time units per timer tick.
     per_tick: u64,
     servo_ticks: u64,
@@ -43,8 +43,11 @@ impl<W: Write> VcdWriter<W> {
         let (magnitude, unit, per_tick) = timescale(simulation.hal().timer_period_ns());
         let joints = simulation.report().joints.len();
         let ids = header(&mut out.text, joints, magnitude, unit).expect("a Vec<u8> takes every byte");
-        let change = |level: char, id: IdCode| format!("{level}{id}\n").into_bytes().into_boxed_slice();
-        let line = |id| [change('0', id), change('1', id)];
+        let line = |id: IdCode| {
+            // the first 94 identifiers have one character; there are at most two for each of MAX_JOINTS
+            let id = id.to_string().as_bytes()[0];
+            [[b'0', id, b'\n'], [b'1', id, b'\n']]
+        };
         let changes = ids.into_iter().map(|(dir, step)| [line(dir), line(step)]).collect();
         let servo_ticks = simulation.servo_period_ns() / simulation.hal().timer_period_ns();
         Self { out, changes, per_tick, servo_ticks, time: None, end: 0 }

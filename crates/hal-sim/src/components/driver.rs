@@ -222,3 +222,48 @@ impl Component for Drivers {
         Box::new(self.clone())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MINIMUM: PulseTimingNs =
+        PulseTimingNs { step_length: 1900, step_space: 1900, dir_setup: 650, dir_hold: 650 };
+
+    /// Direction at 1000, pulse 2000 to 4000, pulse 6000 to 8000, direction at 9000; each time moved by `change`.
+    fn play(change: [i64; 6]) -> Driver {
+        let mut driver = Driver::new(&DriverChannel { minimum: MINIMUM, start: 10 });
+        let mut at = [1000_i64, 2000, 4000, 6000, 8000, 9000].iter().zip(change).map(|(t, c)| (t + c) as u64);
+        let mut next = || at.next().unwrap_or(0);
+        driver.dir_edge(next(), true);
+        for _ in 0..2 {
+            driver.step_edge(next(), true);
+            driver.step_edge(next(), false);
+        }
+        driver.dir_edge(next(), false);
+        driver
+    }
+
+    #[test]
+    fn each_minimum_is_judged() {
+        let total = |change| *play(change).violations();
+        let none = Violations::default();
+        assert_eq!(total([0; 6]), none);
+        // exactly the minimum is legal, one ns less is not
+        assert_eq!(total([350, 0, -100, 0, -100, 0]), none);
+        assert_eq!(total([351, 0, 0, 0, 0, 0]), Violations { dir_setup: 1, ..none });
+        assert_eq!(total([0, 0, -101, 0, -101, 0]), Violations { step_length: 2, ..none });
+        assert_eq!(total([0, 0, 101, 0, 0, 0]), Violations { step_space: 1, ..none });
+        assert_eq!(total([0, 0, 0, 0, 0, -2350]), none);
+        assert_eq!(total([0, 0, 0, 0, 0, -2351]), Violations { dir_hold: 1, ..none });
+    }
+
+    #[test]
+    fn steps_are_counted_at_the_rising_edge_in_the_direction_of_the_line() {
+        let mut driver = play([0; 6]);
+        assert_eq!((driver.position(), driver.steps(), driver.min_interval_ns()), (12, 2, Some(4000)));
+        assert_eq!(driver.step_edge(20_000, true), -1);
+        assert_eq!(driver.step_edge(20_001, true), 0); // no change of the line, no step
+        assert_eq!(driver.position(), 11);
+    }
+}
