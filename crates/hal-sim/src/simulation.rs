@@ -467,6 +467,11 @@ impl Simulation {
         self.lines.iter().map(|line| line.kind)
     }
 
+    /// Steps per mm or rad, in joint order.
+    pub fn steps_per_unit(&self) -> impl Iterator<Item = f64> {
+        self.lines.iter().map(|line| line.steps_per_unit)
+    }
+
     /// Servo period, ns.
     pub const fn servo_period_ns(&self) -> u64 {
         self.servo_period_ns
