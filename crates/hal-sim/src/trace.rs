@@ -74,7 +74,7 @@ pub struct TraceWriter<W: Write> {
 /// What the rows between the ends of periods need.
 struct Between {
     substeps: u32,
-    kinematics: Box<dyn Kinematics>,
+    kinematics: Box<dyn Kinematics + Send>,
     steps_per_unit: Vec<f64>,
     servo_period_ns: u64,
     timer_period_ns: u64,
@@ -152,7 +152,7 @@ impl<W: Write> TraceWriter<W> {
         mut self,
         simulation: &Simulation,
         substeps: u32,
-        kinematics: Box<dyn Kinematics>,
+        kinematics: Box<dyn Kinematics + Send>,
     ) -> Self {
         let report = simulation.report();
         self.between = (substeps > 1).then(|| Between {

@@ -1,0 +1,143 @@
+//! Everything that can be said before anything moves, block by block: language, reach, travel, singularities.
+//!
+//! Nothing is planned here: every programmed move is sampled closely along its whole length. All findings are
+//! reported (one a block and kind), not only the first.
+
+use crate::feeder::{Events, face, frame, interpreter};
+use crate::program::Program;
+use crate::{Options, messages};
+use pkm_canon::Span;
+use pkm_canon::diagnostic::{Diagnostic, Severity};
+use pkm_gcode::Status;
+use pkm_kins::{JointRange, Kinematics, Pose};
+use pkm_machine::Machine;
+use pkm_planner::path::Geometry;
+use pkm_planner::{Event, Move, PlanError, PlanErrorKind};
+use std::collections::VecDeque;
+
+/// Distance between samples, mm (or rad where only angles move), and the most samples a move gets.
+const SPACING: f64 = 0.25;
+const MOST_SAMPLES: u32 = 100_000;
+/// Findings kept.
+const MOST_FINDINGS: usize = 1000;
+
+/// The outcome of a check.
+#[derive(Debug, Clone, Default)]
+pub struct Checked {
+    /// All findings, in program order.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Blocks executed.
+    pub blocks: u64,
+    /// Moves looked at.
+    pub moves: u64,
+}
+
+impl Checked {
+    /// True if a finding forbids to run the program.
+    pub fn has_errors(&self) -> bool {
+        self.diagnostics.iter().any(|d| d.severity == Severity::Error)
+    }
+
+    fn add(&mut self, program: &Program, finding: Diagnostic) {
+        match self.diagnostics.len() {
+            n if n < MOST_FINDINGS => self.diagnostics.push(finding),
+            MOST_FINDINGS => self.diagnostics.push(messages::too_many(program, MOST_FINDINGS)),
+            _ => {}
+        }
+    }
+}
+
+/// Checks a whole program.
+///
+/// # Errors
+/// The program cannot be read.
+pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<Checked, Diagnostic> {
+    let start = options.start.unwrap_or(machine.home);
+    let mut checked = Checked::default();
+    if let Err(kind) = pose_ok(machine, &start) {
+        let error = PlanError { kind, span: Span::default(), pose: start };
+        checked.add(program, messages::plan(program, machine, &error));
+    }
+    let mut interpreter = interpreter(machine, options, &start);
+    let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
+    let mut frame = frame(machine, &start);
+    let mut queue = VecDeque::new();
+    loop {
+        let mut sink = Events { frame: &mut frame, queue: &mut queue };
+        match interpreter.step(&mut *source, &mut sink) {
+            Ok(status) => {
+                checked.blocks += 1;
+                if status == Status::Synch {
+                    interpreter.set_machine_position_mm(face(frame.position()));
+                }
+                while let Some((event, span)) = queue.pop_front() {
+                    if let Event::Move(step) = event {
+                        checked.moves += 1;
+                        check_move(program, machine, &step, span, &mut checked);
+                    }
+                }
+                if status == Status::Ended {
+                    return Ok(checked);
+                }
+            }
+            Err(error) => {
+                queue.clear();
+                checked.add(program, error.to_diagnostic(&program.name(), interpreter.source_line()));
+                if interpreter.has_ended() || checked.diagnostics.len() > MOST_FINDINGS {
+                    return Ok(checked);
+                }
+            }
+        }
+    }
+}
+
+fn pose_ok(machine: &Machine, pose: &Pose) -> Result<(), PlanErrorKind> {
+    let joints = machine.mechanism.inverse(pose).map_err(PlanErrorKind::Unreachable)?;
+    for (joint, (limits, &value)) in machine.joints.iter().zip(&joints).enumerate() {
+        let range = limits.range;
+        if !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE) {
+            return Err(PlanErrorKind::JointTravel { joint, value, range });
+        }
+    }
+    for limits in &machine.axes {
+        let value = pose.get(limits.axis);
+        if let Some(range) = limits.range
+            && !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE)
+        {
+            return Err(PlanErrorKind::AxisTravel { axis: limits.axis, value, range });
+        }
+    }
+    Ok(())
+}
+
+/// Samples one move from end to end; the first place that cannot be is the block's finding.
+fn check_move(program: &Program, machine: &Machine, step: &Move, span: Span, checked: &mut Checked) {
+    if !step.rapid && !(step.feed.speed > 0.0) {
+        checked.add(program, messages::feed_unset(program, span));
+    }
+    let length = step.geometry.length();
+    let bend = if matches!(step.geometry, Geometry::Line(_)) { 1.0 } else { 4.0 };
+    let count = (length * bend / SPACING).clamp(2.0, f64::from(MOST_SAMPLES)) as u32;
+    let mut nearest: Option<(f64, usize, Pose)> = None;
+    for k in 0..=count {
+        let s = if k == count { length } else { length * f64::from(k) / f64::from(count) };
+        let pose = Pose::from_array(step.geometry.at(s).position);
+        if let Err(kind) = pose_ok(machine, &pose) {
+            checked.add(program, messages::plan(program, machine, &PlanError { kind, span, pose }));
+            return;
+        }
+        let Ok(measure) = machine.mechanism.singularity(&pose) else { continue };
+        let value = measure.inverse.min(measure.forward);
+        if !(value >= machine.singularity.guard) {
+            let kind = PlanErrorKind::Unreachable(pkm_kins::InverseError::Singular { measure: value });
+            checked.add(program, messages::plan(program, machine, &PlanError { kind, span, pose }));
+            return;
+        }
+        if value < machine.singularity.warn && nearest.is_none_or(|(best, ..)| value < best) {
+            nearest = Some((value, measure.inverse_joint, pose));
+        }
+    }
+    if let Some((value, joint, pose)) = nearest {
+        checked.add(program, messages::too_near_singularity(program, machine, span, &pose, joint, value));
+    }
+}

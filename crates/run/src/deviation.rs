@@ -1,0 +1,72 @@
+//! How far the executed path is from the programmed one. The programmed pieces are kept as the program wrote them,
+//! before any blend, for as long as the machine is near them.
+
+use pkm_kins::maths::sqrt;
+use pkm_planner::path::{Geometry, Vector};
+use std::collections::VecDeque;
+
+/// The programmed moves around the machine.
+#[derive(Debug, Default)]
+pub(crate) struct Programmed {
+    moves: VecDeque<(u32, Geometry)>,
+}
+
+impl Programmed {
+    pub(crate) fn push(&mut self, motion: u32, geometry: Geometry) {
+        self.moves.push_back((motion, geometry));
+    }
+
+    /// Distance (mm; the larger of XYZ and UVW) of a pose from the path, while the planner is on move `motion`,
+    /// at `s` of it, or on the blend after it.
+    pub(crate) fn distance_mm(&mut self, motion: u32, s: f64, blending: bool, pose: &Vector) -> Option<f64> {
+        while self.moves.get(1).is_some_and(|(number, _)| *number <= motion) {
+            self.moves.pop_front();
+        }
+        let (_, geometry) = self.moves.front().filter(|(number, _)| *number <= motion)?;
+        let mut best = distance_mm(geometry, if blending { geometry.length() } else { s }, pose);
+        if blending && let Some((_, next)) = self.moves.get(1) {
+            best = best.min(distance_mm(next, 0.0, pose));
+        }
+        Some(best)
+    }
+}
+
+/// Distance from the place on a piece nearest to `pose`, found from `s` by Newton's method.
+fn distance_mm(geometry: &Geometry, mut s: f64, pose: &Vector) -> f64 {
+    const LENGTHS: [usize; 6] = [0, 1, 2, 6, 7, 8];
+    let length = geometry.length();
+    for _ in 0..4 {
+        let point = geometry.at(s);
+        let (mut slope, mut curve) = (0.0, 0.0);
+        for i in LENGTHS {
+            let off = point.position[i] - pose[i];
+            slope += point.first[i] * off;
+            curve += point.first[i] * point.first[i] + point.second[i] * off;
+        }
+        if curve > 0.0 {
+            s = (s - slope / curve).clamp(0.0, length);
+        }
+    }
+    let near = geometry.at(s).position;
+    let norm = |from: usize| {
+        let d = |i: usize| near[from + i] - pose[from + i];
+        sqrt(d(0) * d(0) + d(1) * d(1) + d(2) * d(2))
+    };
+    norm(0).max(norm(6))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pkm_planner::path::Arc;
+
+    #[test]
+    fn distance_from_an_arc_is_radial() {
+        let start = [10.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let arc = Arc::new(start, start, [0.0; 3], [0.0, 0.0, 1.0], 1).unwrap();
+        let (c, s) = (0.6, 0.8);
+        let pose = [10.3 * c, 10.3 * s, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let got = distance_mm(&Geometry::Arc(arc), 9.0, &pose);
+        assert!((got - 0.3).abs() < 1e-9, "{got}");
+    }
+}

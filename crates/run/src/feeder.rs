@@ -1,0 +1,259 @@
+//! The motion controller: interpreter → frame → planner, one setpoint per servo period.
+//!
+//! The interpreter is read only as far ahead as the planner has room, so memory does not grow with the program.
+
+use crate::deviation::Programmed;
+use crate::program::Program;
+use crate::{Options, messages};
+use pkm_canon::diagnostic::Diagnostic;
+use pkm_canon::{Canon, CanonSink, Span};
+use pkm_gcode::{Interpreter, LineSource, Settings, Status};
+use pkm_hal_sim::{Setpoint, SetpointSource};
+use pkm_kins::machine::Mechanism;
+use pkm_kins::{Kinematics, Pose, maths};
+use pkm_machine::Machine;
+use pkm_planner::path::{Tolerance, Vector, feed_length};
+use pkm_planner::{AxisLimits, Event, Frame, JointLimits, Limits, Planner, PushError, State};
+use std::collections::VecDeque;
+use std::fmt;
+
+/// Joints and limited axes of any machine here; pieces and nodes for a look-ahead of thousands of short blocks.
+type HostPlanner = Planner<Mechanism, 12, 2048, 2048>;
+
+/// Tolerance of a blend in rotary coordinates, rad (0.01°): G64 P speaks of lengths.
+const BLEND_RAD: f64 = 0.01 / 180.0 * maths::PI;
+
+/// What the interpreter needs to know of a machine.
+pub(crate) fn interpreter(machine: &Machine, options: &Options, start: &Pose) -> Interpreter {
+    let settings = Settings {
+        axes: machine.mechanism.axes(),
+        block_delete: options.block_delete,
+        ..Settings::default()
+    };
+    let mut interpreter = Interpreter::new(settings);
+    interpreter.set_machine_position_mm(face(&start.to_array()));
+    interpreter
+}
+
+/// mm and degrees.
+pub(crate) fn face(pose: &Vector) -> pkm_canon::Position {
+    let mut v = *pose;
+    for angle in &mut v[3..6] {
+        *angle = maths::degrees(*angle);
+    }
+    pkm_canon::Position::from_array(v)
+}
+
+/// The frame a program starts in.
+pub(crate) fn frame(machine: &Machine, start: &Pose) -> Frame {
+    let tolerance = Tolerance { length_mm: machine.path.blend_tolerance, angle_rad: BLEND_RAD };
+    Frame::new(start.to_array(), tolerance)
+}
+
+/// Collects the events of one block.
+pub(crate) struct Events<'a> {
+    pub(crate) frame: &'a mut Frame,
+    pub(crate) queue: &'a mut VecDeque<(Event, Span)>,
+}
+
+impl CanonSink for Events<'_> {
+    fn command(&mut self, command: &Canon<'_>, span: Span) {
+        match self.frame.apply(command, span) {
+            Event::None => {}
+            event => self.queue.push_back((event, span)),
+        }
+    }
+}
+
+/// Why there is no setpoint.
+#[derive(Debug)]
+pub(crate) struct FeederError(pub(crate) Box<Diagnostic>);
+
+impl fmt::Display for FeederError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.message)
+    }
+}
+
+/// The controller of one run.
+pub(crate) struct Feeder<'a> {
+    program: &'a Program,
+    machine: &'a Machine,
+    interpreter: Interpreter,
+    source: Box<dyn LineSource + 'a>,
+    frame: Frame,
+    planner: Box<HostPlanner>,
+    queue: VecDeque<(Event, Span)>,
+    start: Pose,
+    program_ended: bool,
+    failure: Option<Diagnostic>,
+    pub(crate) programmed: Programmed,
+    pub(crate) blocks: u64,
+    pub(crate) path_length_mm: f64,
+}
+
+impl<'a> Feeder<'a> {
+    pub(crate) fn new(
+        program: &'a Program,
+        machine: &'a Machine,
+        options: &Options,
+    ) -> Result<Self, Diagnostic> {
+        let start = options.start.unwrap_or(machine.home);
+        let joints: Vec<JointLimits> = machine
+            .joints
+            .iter()
+            .map(|joint| JointLimits {
+                range: joint.range,
+                max_velocity: joint.max_velocity,
+                max_acceleration: joint.max_acceleration,
+            })
+            .collect();
+        let axes: Vec<AxisLimits> = machine
+            .axes
+            .iter()
+            .map(|limits| AxisLimits {
+                axis: limits.axis,
+                range: limits.range,
+                max_velocity: limits.max_velocity.unwrap_or(f64::INFINITY),
+                max_acceleration: limits.max_acceleration.unwrap_or(f64::INFINITY),
+            })
+            .collect();
+        let limits = Limits::new(&joints, &axes, machine.singularity.guard).map_err(|e| {
+            messages::host(program, &format!("the machine's limits cannot be planned with: {e:?}"))
+        })?;
+        let settings = pkm_planner::Settings {
+            servo_period_s: machine.servo_period_ns as f64 / 1e9,
+            substeps: options.substeps.max(1),
+        };
+        let mut planner = Box::new(
+            HostPlanner::new(machine.mechanism, limits, settings, start)
+                .map_err(|e| messages::plan(program, machine, &e))?,
+        );
+        planner.set_feed_override(options.feed_override);
+        let source = program.open().map_err(|e| messages::unreadable(program, &e))?;
+        Ok(Self {
+            program,
+            machine,
+            interpreter: interpreter(machine, options, &start),
+            source,
+            frame: frame(machine, &start),
+            planner,
+            queue: VecDeque::new(),
+            start,
+            program_ended: false,
+            failure: None,
+            programmed: Programmed::default(),
+            blocks: 0,
+            path_length_mm: 0.0,
+        })
+    }
+
+    pub(crate) fn start(&self) -> Pose {
+        self.start
+    }
+
+    /// Everything driven and at rest.
+    pub(crate) fn is_done(&mut self) -> bool {
+        self.fill();
+        self.program_ended && self.queue.is_empty() && self.planner.is_idle()
+    }
+
+    pub(crate) fn failure(&self) -> Option<&Diagnostic> {
+        self.failure.as_ref()
+    }
+
+    /// Line being executed.
+    pub(crate) fn line(&self) -> u32 {
+        self.planner.setpoint().span.line
+    }
+
+    pub(crate) fn setpoint(&self) -> &pkm_planner::Setpoint {
+        self.planner.setpoint()
+    }
+
+    /// Interprets as far ahead as the planner has room.
+    fn fill(&mut self) {
+        while self.planner.has_room() {
+            if let Some((event, span)) = self.queue.pop_front() {
+                if let Err(failure) = self.take(event, span) {
+                    self.fail(failure);
+                }
+            } else if self.program_ended {
+                self.planner.finish();
+                return;
+            } else {
+                self.step();
+            }
+        }
+    }
+
+    fn step(&mut self) {
+        let mut sink = Events { frame: &mut self.frame, queue: &mut self.queue };
+        match self.interpreter.step(&mut *self.source, &mut sink) {
+            Ok(status) => {
+                self.blocks += 1;
+                self.program_ended = status == Status::Ended;
+                if status == Status::Synch {
+                    self.interpreter.set_machine_position_mm(face(self.frame.position()));
+                }
+            }
+            Err(error) => {
+                let failure = error.to_diagnostic(&self.program.name(), self.interpreter.source_line());
+                self.fail(failure);
+            }
+        }
+    }
+
+    fn fail(&mut self, failure: Diagnostic) {
+        self.failure.get_or_insert(failure);
+        self.program_ended = true;
+        self.queue.clear();
+    }
+
+    fn take(&mut self, event: Event, span: Span) -> Result<(), Diagnostic> {
+        let pushed = match event {
+            Event::None => return Ok(()),
+            Event::Stop => {
+                self.planner.finish();
+                return Ok(());
+            }
+            Event::Dwell { ns } => self.planner.push_dwell(ns, span),
+            Event::Move(step) => self.planner.push(step).map(|motion| {
+                let length = step.geometry.length();
+                self.path_length_mm += length * feed_length(&step.geometry.at(0.0).first, step.feed.group);
+                if length > 0.0 {
+                    self.programmed.push(motion, step.geometry);
+                }
+            }),
+        };
+        match pushed {
+            Ok(()) => Ok(()),
+            Err(PushError::Plan(error)) => Err(messages::plan(self.program, self.machine, &error)),
+            // `has_room` was asked.
+            Err(PushError::Full) => Err(messages::host(self.program, "the planner's queue overran")),
+        }
+    }
+}
+
+impl SetpointSource for Feeder<'_> {
+    type Error = FeederError;
+
+    fn next(&mut self, _tick: u64) -> Result<Setpoint, FeederError> {
+        self.fill();
+        let setpoint = self
+            .planner
+            .tick()
+            .map_err(|e| FeederError(Box::new(messages::plan(self.program, self.machine, &e))))?;
+        if let Some(fault) = self.planner.fault().copied() {
+            let failure = messages::plan(self.program, self.machine, &fault);
+            self.fail(failure);
+        }
+        Ok(Setpoint {
+            pose: setpoint.pose,
+            joints: setpoint.joints,
+            velocities: setpoint.joint_velocity,
+            line: setpoint.span.line,
+            in_position: setpoint.state == State::Idle,
+        })
+    }
+}

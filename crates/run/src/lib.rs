@@ -1,0 +1,164 @@
+//! A program on a machine: from G-code to step pulses.
+//!
+//! [`check`] says everything that can be said before anything moves: language errors, poses out of reach, travel,
+//! singularities, block by block, all findings. [`run`] does that first, then plans the program, steps it on the
+//! simulated HAL and judges the edges. Memory does not grow with the length of the program.
+
+mod check;
+mod deviation;
+mod feeder;
+mod messages;
+mod program;
+mod summary;
+
+pub use check::{Checked, check};
+pub use program::Program;
+pub use summary::{ClosestApproach, JointSummary, SCHEMA, Summary};
+
+use feeder::{Feeder, FeederError};
+use pkm_canon::diagnostic::{Diagnostic, Severity};
+use pkm_hal_sim::{JointConfig, Observer, Simulation, SimulationConfig, TickError};
+use pkm_kins::{Kinematics, Pose};
+use pkm_machine::Machine;
+use std::ops::ControlFlow;
+use summary::Account;
+
+/// What a caller may set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Where the machine stands when the program begins (mm, rad); `None` = the machine's home.
+    pub start: Option<Pose>,
+    /// Feed override, 1 = 100 %.
+    pub feed_override: f64,
+    /// Rows between servo ticks: the simulated HAL runs this many times per servo period (1 = once).
+    pub substeps: u32,
+    /// The run ends, not completed, after so many servo periods.
+    pub max_ticks: u64,
+    /// `/` lines are skipped.
+    pub block_delete: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { start: None, feed_override: 1.0, substeps: 1, max_ticks: 100_000_000, block_delete: false }
+    }
+}
+
+/// How far a run has come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Servo periods so far.
+    pub ticks: u64,
+    /// Line being executed.
+    pub line: u32,
+}
+
+/// Servo periods between two calls of the progress function.
+const PROGRESS_TICKS: u64 = 1000;
+
+/// The planner's queues are larger than the stack of a small thread.
+const STACK_BYTES: usize = 64 << 20;
+
+/// Runs a program on the simulated machine. The whole program is checked first; if that finds an error, nothing moves
+/// and the summary says so (`completed: false`, with the findings).
+///
+/// `outputs` is called once the machine is wired and returns what wants to see every edge and every tick; it comes
+/// back with the summary. `progress` is called now and then and may end the run.
+///
+/// # Errors
+/// The program cannot be read, or the machine cannot be simulated: a diagnostic.
+pub fn run<O: Observer + Send>(
+    program: &Program,
+    machine: &Machine,
+    options: &Options,
+    outputs: impl FnOnce(&Simulation) -> O + Send,
+    progress: impl FnMut(&Progress) -> ControlFlow<()> + Send,
+) -> Result<(Summary, Option<O>), Diagnostic> {
+    let checked = check(program, machine, options)?;
+    if checked.has_errors() {
+        return Ok((Summary::refused(program, machine, checked), None));
+    }
+    std::thread::scope(|scope| {
+        let worker = std::thread::Builder::new()
+            .name("run".to_owned())
+            .stack_size(STACK_BYTES)
+            .spawn_scoped(scope, || drive(program, machine, options, checked, outputs, progress))
+            .map_err(|e| messages::host(program, &format!("cannot start a thread: {e}")))?;
+        worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+fn drive<O: Observer>(
+    program: &Program,
+    machine: &Machine,
+    options: &Options,
+    checked: Checked,
+    outputs: impl FnOnce(&Simulation) -> O,
+    mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
+) -> Result<(Summary, Option<O>), Diagnostic> {
+    let substeps = u64::from(options.substeps.max(1));
+    let mut feeder = Feeder::new(program, machine, options)?;
+    let mut simulation = Simulation::new(&simulation_config(machine, feeder.start(), substeps))
+        .map_err(|e| messages::host(program, &e.to_string()))?;
+    let mut outputs = outputs(&simulation);
+    let mut account = Account::new(machine, &simulation);
+    let mut findings = checked.diagnostics;
+    let mut completed = false;
+    let mut ticks = 0;
+    loop {
+        if feeder.is_done() {
+            completed = feeder.failure().is_none();
+            findings.extend(feeder.failure().cloned());
+            break;
+        }
+        if ticks >= options.max_ticks {
+            findings.push(messages::max_ticks(program, options.max_ticks, feeder.line()));
+            break;
+        }
+        if ticks % PROGRESS_TICKS == 0 && progress(&Progress { ticks, line: feeder.line() }).is_break() {
+            findings.push(messages::interrupted(program, feeder.line(), ticks));
+            break;
+        }
+        ticks += 1;
+        let mut fault = None;
+        for _ in 0..substeps {
+            if let Err(error) = simulation.tick(&mut feeder, &mut [&mut outputs]) {
+                fault = Some(match error {
+                    TickError::Source(FeederError(diagnostic)) => *diagnostic,
+                    TickError::Fault(fault) => messages::fault(program, feeder.line(), &fault),
+                });
+                break;
+            }
+        }
+        if let Some(fault) = fault {
+            findings.push(fault);
+            break;
+        }
+        account.tick(&simulation, &mut feeder);
+    }
+    let mut summary = account.finish(program, machine, &simulation, &feeder);
+    summary.completed = completed && !findings.iter().any(|d| d.severity == Severity::Error);
+    summary.diagnostics = findings;
+    Ok((summary, Some(outputs)))
+}
+
+fn simulation_config(machine: &Machine, start: Pose, substeps: u64) -> SimulationConfig {
+    // The feeder has checked that the start pose has joints.
+    let at_start = machine.mechanism.inverse(&start).unwrap_or_default();
+    let joints = machine.joints.iter().zip(at_start).map(|(joint, start)| JointConfig {
+        name: joint.name.clone(),
+        kind: joint.kind,
+        steps_per_unit: joint.steps_per_unit,
+        timing: joint.timing.pulses(),
+        driver_minimum: joint.driver.pulses(),
+        range: joint.range,
+        start,
+    });
+    SimulationConfig {
+        joints: joints.collect(),
+        axes: machine.mechanism.axes(),
+        start,
+        servo_period_ns: machine.servo_period_ns / substeps,
+        timer_period_ns: machine.timer_period_ns,
+    }
+}

@@ -1,0 +1,174 @@
+//! From errors of the rooms below to one sentence for a person: what, where, value, limit, what to do.
+
+use crate::program::Program;
+use pkm_canon::Span;
+use pkm_canon::diagnostic::{Diagnostic, Severity};
+use pkm_hal_sim::Fault;
+use pkm_kins::{Kinematics, Pose, maths};
+use pkm_machine::Machine;
+use pkm_planner::{PlanError, PlanErrorKind};
+use std::io;
+
+fn at(
+    program: &Program,
+    span: Span,
+    code: &str,
+    severity: Severity,
+    message: String,
+    help: &str,
+) -> Diagnostic {
+    // Columns count from 1; 0 is the line as a whole.
+    let (column, end_column) = if span.end > span.start { (span.start + 1, span.end + 1) } else { (0, 0) };
+    Diagnostic {
+        code: code.to_owned(),
+        severity,
+        message,
+        help: Some(help.to_owned()),
+        file: program.name(),
+        line: span.line,
+        column,
+        end_column,
+    }
+}
+
+/// The program cannot be read.
+pub(crate) fn unreadable(program: &Program, error: &io::Error) -> Diagnostic {
+    let message = format!("cannot read {}: {error}", program.name());
+    at(program, Span::default(), "file-open", Severity::Error, message, "check the path and its permissions")
+}
+
+/// Something is wrong with the machine or this computer, not with a block.
+pub(crate) fn host(program: &Program, what: &str) -> Diagnostic {
+    at(program, Span::default(), "cannot-run", Severity::Error, what.to_owned(), "check the machine file")
+}
+
+/// The coordinates a machine has, as a program writes them.
+pub(crate) fn place(machine: &Machine, pose: &Pose) -> String {
+    let words = machine.mechanism.axes().iter().map(|axis| {
+        let value = pose.get(axis);
+        let value = if axis.is_rotary() { maths::degrees(value) } else { value };
+        format!("{}{:.3}", axis.letter(), value + 0.0)
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// A place on the path that the machine cannot be at.
+pub(crate) fn plan(program: &Program, machine: &Machine, error: &PlanError) -> Diagnostic {
+    let place = place(machine, &error.pose);
+    match error.kind {
+        PlanErrorKind::JointTravel { joint, value, range } => {
+            let low = value < range.min;
+            let (prefix, name) = machine.mechanism.joint_code(joint);
+            let code = format!("{prefix}limit_{}:{name}", if low { "low" } else { "high" });
+            let (joint_name, unit, face): (_, _, &dyn Fn(f64) -> f64) = match machine.joints.get(joint) {
+                Some(j) => (j.name.as_str(), unit(j.kind), &|v| j.to_face(v)),
+                None => ("?", "mm", &|v| v),
+            };
+            let message = format!(
+                "at {place} joint {joint_name} would have to be at {:.4} {unit} (travel {} to {} {unit})",
+                face(value),
+                face(range.min),
+                face(range.max)
+            );
+            let beyond = face(if low { range.min - value } else { value - range.max });
+            let help = format!(
+                "move the part so that {joint_name} needs {beyond:.4} {unit} less, or choose another configuration"
+            );
+            at(program, error.span, &code, Severity::Error, message, &help)
+        }
+        PlanErrorKind::AxisTravel { axis, value, range } => {
+            let side = if value < range.min { "low" } else { "high" };
+            let code = format!("axis_limit_{side}:{}", axis.letter());
+            let (unit, face): (_, fn(f64) -> f64) =
+                if axis.is_rotary() { ("°", maths::degrees) } else { ("mm", |v| v) };
+            let message = format!(
+                "{}{:.4} {unit} is outside the axis' range of {} to {} {unit}",
+                axis.letter(),
+                face(value),
+                face(range.min),
+                face(range.max)
+            );
+            at(program, error.span, &code, Severity::Error, message, "shift the work offset or the part")
+        }
+        PlanErrorKind::Unreachable(inner) => {
+            let message = format!("{place} cannot be reached: {inner}");
+            at(
+                program,
+                error.span,
+                &inner.code().to_string(),
+                Severity::Error,
+                message,
+                "move the part into the workspace (`pkm workspace` draws it), or choose another configuration",
+            )
+        }
+        _ => at(
+            program,
+            error.span,
+            "cannot-run",
+            Severity::Error,
+            format!("{place} cannot be run"),
+            "please report this message",
+        ),
+    }
+}
+
+fn unit(kind: pkm_kins::JointKind) -> &'static str {
+    match kind {
+        pkm_kins::JointKind::Linear => "mm",
+        pkm_kins::JointKind::Rotary => "°",
+    }
+}
+
+/// A refusal of the simulated HAL.
+pub(crate) fn fault(program: &Program, line: u32, fault: &Fault) -> Diagnostic {
+    let span = Span { line, ..Span::default() };
+    let help = "lower the joint's max velocity or steps per unit, or shorten the driver's times";
+    at(program, span, "hal-fault", Severity::Error, fault.to_string(), help)
+}
+
+pub(crate) fn max_ticks(program: &Program, ticks: u64, line: u32) -> Diagnostic {
+    let span = Span { line, ..Span::default() };
+    let message = format!("the run was ended after {ticks} servo periods (--max-ticks), in line {line}");
+    at(
+        program,
+        span,
+        "max-ticks",
+        Severity::Error,
+        message,
+        "raise --max-ticks if the program is meant to run longer",
+    )
+}
+
+pub(crate) fn interrupted(program: &Program, line: u32, ticks: u64) -> Diagnostic {
+    let span = Span { line, ..Span::default() };
+    let message = format!("interrupted in line {line} after {ticks} servo periods");
+    at(program, span, "interrupted", Severity::Error, message, "run it again to finish it")
+}
+
+pub(crate) fn too_near_singularity(
+    program: &Program,
+    machine: &Machine,
+    span: Span,
+    pose: &Pose,
+    joint: usize,
+    measure: f64,
+) -> Diagnostic {
+    let name = machine.joints.get(joint).map_or("?", |j| j.name.as_str());
+    let message = format!(
+        "at {} the mechanism comes near a singularity: measure {measure:.4} at joint {name} (warned below {})",
+        place(machine, pose),
+        machine.singularity.warn
+    );
+    let help = "expect slow motion here; move the part away from the edge of the workspace";
+    at(program, span, "near-singular", Severity::Warning, message, help)
+}
+
+pub(crate) fn feed_unset(program: &Program, span: Span) -> Diagnostic {
+    let help = "give an F word before the first G1, G2 or G3";
+    at(program, span, "feed-zero", Severity::Error, "a feed move with no feed rate".to_owned(), help)
+}
+
+pub(crate) fn too_many(program: &Program, kept: usize) -> Diagnostic {
+    let message = format!("only the first {kept} findings are listed");
+    at(program, Span::default(), "too-many", Severity::Note, message, "mend these and check again")
+}

@@ -1,0 +1,40 @@
+//! Where a program comes from. It is read twice (check, then run), so a pipe is kept in memory; a file is streamed.
+
+use pkm_gcode::{FileSource, LineSource, MemorySource};
+use std::io;
+use std::path::PathBuf;
+
+/// A G-code program.
+#[derive(Debug, Clone)]
+pub enum Program {
+    /// A file, streamed.
+    File(PathBuf),
+    /// Text in memory, with the name that messages give it.
+    Memory {
+        /// For messages.
+        name: String,
+        /// The program.
+        text: Vec<u8>,
+    },
+}
+
+impl Program {
+    /// Its name in messages.
+    pub fn name(&self) -> String {
+        match self {
+            Program::File(path) => path.display().to_string(),
+            Program::Memory { name, .. } => name.clone(),
+        }
+    }
+
+    /// Opens it at its first line. Subroutine files are looked for beside the program.
+    pub(crate) fn open(&self) -> io::Result<Box<dyn LineSource + '_>> {
+        Ok(match self {
+            Program::File(path) => {
+                let beside = path.parent().map(PathBuf::from).into_iter().collect();
+                Box::new(FileSource::open(path, beside)?)
+            }
+            Program::Memory { text, .. } => Box::new(MemorySource::new(text)),
+        })
+    }
+}

@@ -1,0 +1,286 @@
+//! What a run was: the JSON summary that scripts rely on, gathered tick by tick from the simulated machine.
+
+use crate::check::Checked;
+use crate::feeder::Feeder;
+use crate::program::Program;
+use pkm_canon::diagnostic::Diagnostic;
+use pkm_hal_sim::Simulation;
+use pkm_kins::maths::sqrt;
+use pkm_kins::{Joints, Kinematics, MAX_JOINTS, Pose};
+use pkm_machine::Machine;
+use serde::Serialize;
+
+/// Version of the summary.
+pub const SCHEMA: u32 = 1;
+
+/// One joint over the whole run; mm or degrees, and seconds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JointSummary {
+    /// As the machine file names it.
+    pub name: String,
+    /// Lowest commanded position.
+    pub min: f64,
+    /// Highest commanded position.
+    pub max: f64,
+    /// Largest |first difference| of the commanded position over a servo period.
+    pub peak_velocity: f64,
+    /// Largest |second difference|.
+    pub peak_acceleration: f64,
+    /// From the machine file.
+    pub velocity_limit: f64,
+    /// From the machine file.
+    pub acceleration_limit: f64,
+    /// Steps in either direction.
+    pub steps: u64,
+    /// Shortest time between two steps; 0 if there were fewer than two.
+    pub min_pulse_interval_ns: u64,
+}
+
+/// Where the program came nearest to a singularity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ClosestApproach {
+    /// Line of the block.
+    pub line: u32,
+    /// The joint whose link is nearest to a right angle with its guide.
+    pub joint: String,
+}
+
+/// The summary of a run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Version of this format.
+    pub schema: u32,
+    /// The program's name.
+    pub program: String,
+    /// The machine's name.
+    pub machine: String,
+    /// The whole program ran.
+    pub completed: bool,
+    /// Blocks executed.
+    pub blocks: u64,
+    /// From the first motion to rest after the last.
+    pub duration_s: f64,
+    /// Length of the programmed path, in the coordinates the feed counts.
+    pub path_length_mm: f64,
+    /// Servo periods simulated.
+    pub servo_ticks: u64,
+    /// In joint order.
+    pub joints: Vec<JointSummary>,
+    /// Largest distance between the path rebuilt from the edges and the programmed one, at the ends of servo periods.
+    pub max_path_deviation_mm: f64,
+    /// How far half a step of every joint can move the tool, at the worst place of this run: the share of
+    /// `max_path_deviation_mm` that any stepping machine has.
+    pub half_step_reach_mm: f64,
+    /// Largest |counted − commanded| position at the ends of servo periods, steps.
+    pub max_step_error_steps: f64,
+    /// The same just before and after each edge (timer resolution included).
+    pub max_edge_error_steps: f64,
+    /// Smallest singularity measure on the way.
+    pub min_singularity_distance: f64,
+    /// Where that was.
+    pub closest_approach: ClosestApproach,
+    /// Times shorter than the driver's data sheet allows.
+    pub driver_timing_violations: u64,
+    /// Steps moved later for the driver's sake, and the largest delay.
+    pub delayed_steps: u64,
+    /// ns
+    pub max_step_delay_ns: u64,
+    /// What a person should know.
+    #[serde(skip)]
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+impl Summary {
+    /// The program was refused before anything moved.
+    pub(crate) fn refused(program: &Program, machine: &Machine, checked: Checked) -> Self {
+        let joints = machine.joints.iter().map(|joint| JointSummary {
+            name: joint.name.clone(),
+            min: 0.0,
+            max: 0.0,
+            peak_velocity: 0.0,
+            peak_acceleration: 0.0,
+            velocity_limit: joint.to_face(joint.max_velocity),
+            acceleration_limit: joint.to_face(joint.max_acceleration),
+            steps: 0,
+            min_pulse_interval_ns: 0,
+        });
+        Summary {
+            schema: SCHEMA,
+            program: program.name(),
+            machine: machine.name.clone(),
+            completed: false,
+            blocks: checked.blocks,
+            duration_s: 0.0,
+            path_length_mm: 0.0,
+            servo_ticks: 0,
+            joints: joints.collect(),
+            max_path_deviation_mm: 0.0,
+            half_step_reach_mm: 0.0,
+            max_step_error_steps: 0.0,
+            max_edge_error_steps: 0.0,
+            min_singularity_distance: 0.0,
+            closest_approach: ClosestApproach { line: 0, joint: String::new() },
+            driver_timing_violations: 0,
+            delayed_steps: 0,
+            max_step_delay_ns: 0,
+            diagnostics: checked.diagnostics,
+        }
+    }
+}
+
+/// Servo periods between two looks at the half-step reach, which needs 2ⁿ forward solutions.
+const REACH_EVERY: u64 = 256;
+
+/// Gathers the summary tick by tick.
+pub(crate) struct Account<'a> {
+    machine: &'a Machine,
+    period_s: f64,
+    ticks: u64,
+    first_motion: Option<u64>,
+    last_motion: u64,
+    last: [Joints; 2],
+    min: Joints,
+    max: Joints,
+    velocity: Joints,
+    acceleration: Joints,
+    deviation_mm: f64,
+    reach_mm: f64,
+    singularity: f64,
+    closest: (u32, usize),
+}
+
+impl<'a> Account<'a> {
+    pub(crate) fn new(machine: &'a Machine, simulation: &Simulation) -> Self {
+        let start = simulation.report().setpoint.joints;
+        Self {
+            machine,
+            period_s: machine.servo_period_ns as f64 / 1e9,
+            ticks: 0,
+            first_motion: None,
+            last_motion: 0,
+            last: [start; 2],
+            min: start,
+            max: start,
+            velocity: [0.0; MAX_JOINTS],
+            acceleration: [0.0; MAX_JOINTS],
+            deviation_mm: 0.0,
+            reach_mm: 0.0,
+            singularity: f64::INFINITY,
+            closest: (0, 0),
+        }
+    }
+
+    pub(crate) fn tick(&mut self, simulation: &Simulation, feeder: &mut Feeder<'_>) {
+        self.ticks += 1;
+        let setpoint = *feeder.setpoint();
+        let [before, last] = self.last;
+        let mut moved = false;
+        for (j, &q) in setpoint.joints.iter().enumerate() {
+            moved |= q != last[j];
+            self.min[j] = self.min[j].min(q);
+            self.max[j] = self.max[j].max(q);
+            let velocity = (q - last[j]) / self.period_s;
+            let acceleration = (q - 2.0 * last[j] + before[j]) / (self.period_s * self.period_s);
+            self.velocity[j] = self.velocity[j].max(velocity.abs());
+            self.acceleration[j] = self.acceleration[j].max(acceleration.abs());
+        }
+        self.last = [last, setpoint.joints];
+        if moved {
+            self.first_motion.get_or_insert(self.ticks - 1);
+            self.last_motion = self.ticks;
+        }
+        let mechanism = &self.machine.mechanism;
+        if let Ok(measure) = mechanism.singularity(&setpoint.pose) {
+            let value = measure.inverse.min(measure.forward);
+            if value < self.singularity {
+                self.singularity = value;
+                self.closest = (setpoint.span.line, measure.inverse_joint);
+            }
+        }
+        if let Ok(executed) = simulation.feedback_pose(mechanism)
+            && let Some(distance) = feeder.programmed.distance_mm(
+                setpoint.motion,
+                setpoint.s,
+                setpoint.blending,
+                &executed.to_array(),
+            )
+        {
+            self.deviation_mm = self.deviation_mm.max(distance);
+        }
+        if self.ticks % REACH_EVERY == 1 {
+            self.reach_mm =
+                self.reach_mm.max(half_step_reach_mm(self.machine, &setpoint.pose, &setpoint.joints));
+        }
+    }
+
+    pub(crate) fn finish(
+        self,
+        program: &Program,
+        machine: &Machine,
+        simulation: &Simulation,
+        feeder: &Feeder<'_>,
+    ) -> Summary {
+        let statistics = simulation.statistics();
+        let joints =
+            machine.joints.iter().zip(&statistics).enumerate().map(|(j, (joint, counted))| JointSummary {
+                name: joint.name.clone(),
+                min: joint.to_face(self.min[j]),
+                max: joint.to_face(self.max[j]),
+                peak_velocity: joint.to_face(self.velocity[j]),
+                peak_acceleration: joint.to_face(self.acceleration[j]),
+                velocity_limit: joint.to_face(joint.max_velocity),
+                acceleration_limit: joint.to_face(joint.max_acceleration),
+                steps: counted.steps,
+                min_pulse_interval_ns: counted.min_pulse_interval_ns.unwrap_or(0),
+            });
+        let largest =
+            |f: fn(&pkm_hal_sim::JointStatistics) -> f64| statistics.iter().map(f).fold(0.0, f64::max);
+        Summary {
+            schema: SCHEMA,
+            program: program.name(),
+            machine: machine.name.clone(),
+            completed: false,
+            blocks: feeder.blocks,
+            duration_s: (self.last_motion - self.first_motion.unwrap_or(self.last_motion)) as f64
+                * self.period_s,
+            path_length_mm: feeder.path_length_mm,
+            servo_ticks: self.ticks,
+            joints: joints.collect(),
+            max_path_deviation_mm: self.deviation_mm,
+            half_step_reach_mm: self.reach_mm,
+            max_step_error_steps: largest(|s| s.max_step_error),
+            max_edge_error_steps: largest(|s| s.max_edge_error),
+            min_singularity_distance: if self.singularity.is_finite() { self.singularity } else { 0.0 },
+            closest_approach: ClosestApproach {
+                line: self.closest.0,
+                joint: machine.joints.get(self.closest.1).map_or_else(String::new, |j| j.name.clone()),
+            },
+            driver_timing_violations: statistics.iter().map(|s| s.violations.total()).sum(),
+            delayed_steps: statistics.iter().map(|s| s.delayed_steps).sum(),
+            max_step_delay_ns: statistics.iter().map(|s| s.max_delay_ns).max().unwrap_or(0),
+            diagnostics: Vec::new(),
+        }
+    }
+}
+
+/// How far the tool can be from its place when every joint is half a step away from its own.
+fn half_step_reach_mm(machine: &Machine, pose: &Pose, joints: &Joints) -> f64 {
+    let n = machine.joints.len().min(MAX_JOINTS);
+    let mut farthest = 0.0_f64;
+    for corner in 0..1_u32 << n {
+        let mut moved = *joints;
+        for (j, (joint, q)) in machine.joints.iter().zip(&mut moved).enumerate() {
+            let half = 0.5 / joint.steps_per_unit;
+            *q += if corner & (1 << j) == 0 { half } else { -half };
+        }
+        if let Ok(there) = machine.mechanism.forward(&moved, pose) {
+            let (a, b) = (there.to_array(), pose.to_array());
+            let norm = |from: usize| {
+                let d = |i: usize| a[from + i] - b[from + i];
+                sqrt(d(0) * d(0) + d(1) * d(1) + d(2) * d(2))
+            };
+            farthest = farthest.max(norm(0)).max(norm(6));
+        }
+    }
+    farthest
+}

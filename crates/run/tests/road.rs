@@ -1,0 +1,112 @@
+//! The whole road on the shipped programs: run, then let the independent judge read the trace, and count the VCD back.
+
+use pkm_analysis::checker;
+use pkm_hal_sim::{Observer, Simulation, TickReport, TraceWriter, VcdSteps, VcdWriter};
+use pkm_machine::Machine;
+use pkm_run::{Options, Program, Summary, run};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+struct Outputs {
+    trace: TraceWriter<Vec<u8>>,
+    vcd: VcdWriter<Vec<u8>>,
+    /// Counts per joint at every tick, from the simulation itself.
+    counts: Vec<(u64, Vec<i64>)>,
+}
+
+impl Observer for Outputs {
+    fn edge(&mut self, edge: &pkm_stepgen::Edge) {
+        self.vcd.edge(edge);
+    }
+
+    fn tick(&mut self, report: &TickReport<'_>) {
+        self.trace.tick(report);
+        self.vcd.tick(report);
+        self.counts.push((report.time_ns, report.joints.iter().map(|j| j.count).collect()));
+    }
+}
+
+fn drive(
+    program: &str,
+    machine: &Machine,
+    options: &Options,
+) -> (Summary, Vec<u8>, Vec<u8>, Vec<(u64, Vec<i64>)>) {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../programs").join(program);
+    let outputs = |simulation: &Simulation| Outputs {
+        trace: TraceWriter::new(Vec::new(), simulation),
+        vcd: VcdWriter::new(Vec::new(), simulation),
+        counts: Vec::new(),
+    };
+    let (summary, outputs) =
+        run(&Program::File(path), machine, options, outputs, |_| ControlFlow::Continue(()))
+            .expect("readable");
+    let outputs = outputs.unwrap_or_else(|| panic!("refused: {:?}", summary.diagnostics));
+    let trace = outputs.trace.finish().unwrap();
+    (summary, trace, outputs.vcd.finish().unwrap(), outputs.counts)
+}
+
+fn holds(program: &str, machine: &str) {
+    let machine = Machine::load(machine, &[]).expect("a shipped machine");
+    let (summary, trace, vcd, counts) = drive(program, &machine, &Options::default());
+    println!("{summary:#?}");
+    assert!(summary.completed, "{program}: {:?}", summary.diagnostics);
+    assert!(summary.max_step_error_steps <= 0.5, "{program}: {}", summary.max_step_error_steps);
+    assert_eq!(summary.driver_timing_violations, 0);
+    for joint in &summary.joints {
+        assert!(joint.peak_velocity <= joint.velocity_limit, "{program}: {joint:?}");
+        assert!(joint.peak_acceleration <= joint.acceleration_limit, "{program}: {joint:?}");
+    }
+    assert!(
+        summary.max_path_deviation_mm <= summary.half_step_reach_mm,
+        "{program}: {} > {}",
+        summary.max_path_deviation_mm,
+        summary.half_step_reach_mm
+    );
+    let verdict = checker::judge(trace.as_slice(), &machine).unwrap();
+    assert_eq!(verdict.violations, vec![], "{program}");
+    assert_eq!(verdict.rows, summary.servo_ticks + 1);
+    // The judge's own peaks agree with the summary's.
+    for (peaks, joint) in verdict.joints.iter().zip(&summary.joints) {
+        assert!((peaks.velocity - joint.peak_velocity).abs() <= 1e-6 * joint.velocity_limit);
+    }
+    let mut steps = VcdSteps::new(vcd.as_slice()).unwrap();
+    let start: Vec<i64> = {
+        let first = trace_row(&trace, 1);
+        machine
+            .joints
+            .iter()
+            .enumerate()
+            .map(|(n, j)| (first[n] * j.steps_per_unit / j.to_face(1.0)).round() as i64)
+            .collect()
+    };
+    for (time_ns, counts) in &counts {
+        let counted = steps.counts_at(*time_ns).unwrap();
+        let expected: Vec<i64> = counts.iter().zip(&start).map(|(count, start)| count - start).collect();
+        assert_eq!(counted, expected.as_slice(), "{program} at {time_ns} ns");
+    }
+}
+
+/// The counted joint positions of a row of the trace, from 1 after the header.
+fn trace_row(trace: &[u8], row: usize) -> Vec<f64> {
+    let text = std::str::from_utf8(trace).unwrap();
+    let mut lines = text.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let fields: Vec<&str> = lines.nth(row - 1).unwrap().split(',').collect();
+    let counted = header.iter().zip(&fields).filter(|(name, _)| name.contains(".pos-fb_"));
+    counted.map(|(_, value)| value.parse().unwrap()).collect()
+}
+
+#[test]
+fn aerofoil_on_moma_w() {
+    holds("moma-w-aerofoil.ngc", "moma-w");
+}
+
+#[test]
+fn moulding_on_moma_w() {
+    holds("moma-w-moulding.ngc", "moma-w");
+}
+
+#[test]
+fn arcs_on_moma_a() {
+    holds("moma-arcs.ngc", "moma-a");
+}
