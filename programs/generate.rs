@@ -156,7 +156,7 @@ const ABOVE_MM: f64 = 18.0;
 
 /// Frame, lead-in, one block per point, lead-out.
 fn program(text: &mut String, path: &[(Point, Point)], lead_in: (Point, Point), lead_out: (Point, Point)) {
-    text.push_str("G21 G90 G94 G17 G64 P0.01\n(above the block to the lead-in)\nG0 Z50\n");
+    text.push_str("G21 G90 G94 G17 G64 P0.0005\n(above the block to the lead-in)\nG0 Z50\n");
     let block = |text: &mut String, word: &str, (a, b): (Point, Point)| {
         let _ = writeln!(text, "{word} X{} Y{} U{} V{}", fixed(a[0]), fixed(a[1]), fixed(b[0]), fixed(b[1]));
     };

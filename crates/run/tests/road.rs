@@ -45,7 +45,8 @@ fn drive(
     (summary, trace, outputs.vcd.finish().unwrap(), outputs.counts)
 }
 
-fn holds(program: &str, machine: &str) {
+/// `blend_mm`: what the program's G64 P allows beyond half a step of every joint.
+fn holds(program: &str, machine: &str, blend_mm: f64) {
     let machine = Machine::load(machine, &[]).expect("a shipped machine");
     let (summary, trace, vcd, counts) = drive(program, &machine, &Options::default());
     println!("{summary:#?}");
@@ -57,7 +58,7 @@ fn holds(program: &str, machine: &str) {
         assert!(joint.peak_acceleration <= joint.acceleration_limit, "{program}: {joint:?}");
     }
     assert!(
-        summary.max_path_deviation_mm <= summary.half_step_reach_mm,
+        summary.max_path_deviation_mm <= summary.half_step_reach_mm + blend_mm,
         "{program}: {} > {}",
         summary.max_path_deviation_mm,
         summary.half_step_reach_mm
@@ -98,15 +99,15 @@ fn trace_row(trace: &[u8], row: usize) -> Vec<f64> {
 
 #[test]
 fn aerofoil_on_moma_w() {
-    holds("moma-w-aerofoil.ngc", "moma-w");
+    holds("moma-w-aerofoil.ngc", "moma-w", 0.0);
 }
 
 #[test]
 fn moulding_on_moma_w() {
-    holds("moma-w-moulding.ngc", "moma-w");
+    holds("moma-w-moulding.ngc", "moma-w", 0.0);
 }
 
 #[test]
 fn arcs_on_moma_a() {
-    holds("moma-arcs.ngc", "moma-a");
+    holds("moma-arcs.ngc", "moma-a", 0.01);
 }
