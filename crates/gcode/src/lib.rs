@@ -37,6 +37,7 @@ mod line;
 mod modal;
 mod parameters;
 mod settings;
+mod simulation;
 mod source;
 mod tool_table;
 
@@ -44,6 +45,7 @@ pub use error::{Code, Error, ErrorKind};
 pub use interpreter::{Interpreter, Status};
 pub use parameters::Parameters;
 pub use settings::{Dialect, Settings};
+pub use simulation::{SimulatedMachine, canon_text, canon_text_of};
 #[cfg(feature = "std")]
 pub use source::FileSource;
 pub use source::{LineSource, MAX_LINE, MemorySource, Place, SourceError};

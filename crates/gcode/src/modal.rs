@@ -245,7 +245,7 @@ impl Modal {
             flood: false,
             feed_override: true,
             adaptive_feed: false,
-            feed_hold: false,
+            feed_hold: true,
         }
     }
 }

@@ -7,6 +7,10 @@ use alloc::{boxed::Box, collections::BTreeMap, vec::Vec};
 
 const COUNT: usize = LAST_PARAMETER as usize + 1;
 
+/// First of the nine coordinates of the last probe trip.
+pub(crate) const PROBE_POINT: i32 = 5061;
+/// 1 if the probe tripped.
+pub(crate) const PROBE_TRIPPED: i32 = 5070;
 /// First of the nine G28 coordinates, machine units.
 pub(crate) const G28_HOME: i32 = 5161;
 /// First of the nine G30 coordinates, machine units.

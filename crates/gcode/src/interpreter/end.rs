@@ -3,6 +3,7 @@
 use super::{Out, state::State};
 use crate::modal::{FeedMode, G1};
 use crate::parameters;
+use crate::settings::Dialect;
 use pkm_canon::{Canon, Plane};
 
 impl State {
@@ -33,7 +34,11 @@ impl State {
             self.modal.spindles[usize::from(spindle)].surface_speed = None;
             out.emit(Canon::StopSpindle { spindle: n });
             if !self.modal.spindles[usize::from(spindle)].speed_override {
-                self.set_speed_override(n, true, out);
+                self.modal.spindles[usize::from(spindle)].speed_override = true;
+                // LinuxCNC switches it on without saying so.
+                if self.settings.dialect == Dialect::Pkm {
+                    out.emit(Canon::SpeedOverride { spindle: n, on: true });
+                }
             }
             out.emit(Canon::SetSpindleMode { spindle: n, css_limit: 0.0 });
         }

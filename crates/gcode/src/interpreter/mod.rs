@@ -14,7 +14,7 @@ mod tools;
 use crate::block::Block;
 use crate::error::{Error, ErrorKind};
 use crate::line::Line;
-use crate::parameters::Parameters;
+use crate::parameters::{self, Parameters};
 use crate::settings::{Dialect, Settings};
 use crate::source::LineSource;
 use crate::tool_table::ToolTable;
@@ -66,12 +66,19 @@ pub struct Interpreter {
     line: Line,
     block: Block,
     phase: Phase,
+    begun: bool,
 }
 
 impl Interpreter {
     /// An interpreter in its start state: G17 G21 G40 G49 G54 G80 G90 G91.1 G94 G97 G99 G8, position 0.
     pub fn new(settings: Settings) -> Self {
-        Self { state: State::new(settings), line: Line::new(), block: Block::new(), phase: Phase::New }
+        Self {
+            state: State::new(settings),
+            line: Line::new(),
+            block: Block::new(),
+            phase: Phase::New,
+            begun: false,
+        }
     }
 
     /// The parameters.
@@ -119,6 +126,27 @@ impl Interpreter {
         self.state.position = position.to_array();
     }
 
+    /// Tells the interpreter where the probe tripped (program coordinates and units) and whether it did.
+    pub fn set_probe_result(&mut self, point: Position, tripped: bool) {
+        self.state.parameters.set_nine(parameters::PROBE_POINT, &point.to_array());
+        self.state.parameters.set(parameters::PROBE_TRIPPED, tripped.into());
+    }
+
+    /// Tells the interpreter the answer to M66: the input's value, or `None` when the wait timed out.
+    pub fn set_input(&mut self, value: Option<f64>) {
+        self.state.parameters.set(parameters::INPUT, value.unwrap_or(-1.0));
+    }
+
+    /// True after M2, M30, M99, the closing `%` or the end of the file.
+    pub fn has_ended(&self) -> bool {
+        self.phase == Phase::Ended
+    }
+
+    /// True once a block was read.
+    pub fn has_begun(&self) -> bool {
+        self.begun
+    }
+
     /// Emits what every program begins with: units, offsets, rotation. The first step does it by itself.
     pub fn start(&mut self, sink: &mut dyn CanonSink) {
         if self.phase != Phase::New {
@@ -153,14 +181,16 @@ impl Interpreter {
                     text = self.without_byte_order_mark(text);
                 }
                 let loaded = self.line.load(text, place.file, number);
-                sink.line_read(self.line.raw(), self.line.whole());
+                let mut frame_begins = false;
                 if self.phase == Phase::Opening && !self.line.raw().is_empty() {
-                    Out { sink, span: Span::default() }.emit(Canon::OnReset);
-                    let framed = self.line.raw().trim_ascii() == b"%";
-                    self.phase = Phase::Running { framed };
-                    if framed {
-                        return Ok(Status::Running);
-                    }
+                    Out { sink: &mut *sink, span: Span::default() }.emit(Canon::OnReset);
+                    self.begun = true;
+                    frame_begins = self.line.raw().trim_ascii() == b"%";
+                    self.phase = Phase::Running { framed: frame_begins };
+                }
+                sink.line_read(self.line.raw(), self.line.whole());
+                if frame_begins {
+                    return Ok(Status::Running);
                 }
                 loaded?;
             }

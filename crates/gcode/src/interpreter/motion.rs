@@ -74,14 +74,12 @@ impl State {
             return Err(block.word_error(letter, ErrorKind::PolarMixed { letter: 'G' }));
         }
         let mut machine = self.machine_point(self.position);
-        let keeps_tool = self.settings.dialect != crate::Dialect::Pkm;
         for (axis, coordinate) in machine.iter_mut().enumerate() {
             if let Some(value) = block.axis(axis) {
-                let rotary_tool =
-                    if keeps_tool && (3..6).contains(&axis) { self.tool_offset[axis] } else { 0.0 };
-                *coordinate = value + rotary_tool;
+                *coordinate = value;
             }
         }
+        self.keep_rotary_tool_offset(&mut machine);
         let mut end = self.program_point(machine);
         // What was not named stays, bit for bit; X and Y are one where the system is turned.
         for (axis, coordinate) in end.iter_mut().enumerate() {

@@ -1,11 +1,15 @@
 //! Coordinate systems and offsets: G54 to G59.3, G10, G28, G30, G52, G92. None of them moves the machine: each
 //! recomputes the program position so that the machine point stays.
 
-use super::{Out, state::State};
+use super::{
+    Out,
+    state::{State, rotate},
+};
 use crate::block::Block;
 use crate::error::{Error, ErrorKind};
 use crate::modal::*;
 use crate::parameters::{self, system_offset};
+use crate::settings::Dialect;
 use pkm_canon::{Canon, Position};
 use pkm_kins::maths;
 
@@ -86,8 +90,9 @@ impl State {
         }
         let kept = self.parameters.nine(first);
         let mut stored = self.machine_units(offset);
+        let together = l == 20 && rotation != 0.0 && block.has_any(b"XY");
         for axis in 0..9 {
-            if block.axis(axis).is_none() {
+            if block.axis(axis).is_none() && !(axis < 2 && together) {
                 stored[axis] = kept[axis];
             }
         }
@@ -106,14 +111,24 @@ impl State {
         Ok(())
     }
 
-    /// G10 L20: machine = R (p + g92) + offset + tool with p as wanted, so the offset follows.
+    /// G10 L20: machine = R (p + g92) + offset + tool, with p as wanted; axes without a word keep their present
+    /// reading in that system. In a turned system X and Y change together.
     fn offset_for_reading(&self, block: &Block, rotation_deg: f64, offset: &mut [f64; 9]) {
         let machine = self.machine_point(self.position);
-        let mut wanted: [f64; 9] =
-            core::array::from_fn(|axis| block.axis(axis).unwrap_or(self.position[axis]) + self.g92[axis]);
-        super::state::rotate(&mut wanted, rotation_deg);
-        for axis in (0..9).filter(|axis| block.axis(*axis).is_some()) {
-            offset[axis] = machine[axis] - self.tool_offset[axis] - wanted[axis];
+        let without_tool: [f64; 9] = core::array::from_fn(|axis| machine[axis] - self.tool_offset[axis]);
+        let mut reading: [f64; 9] = core::array::from_fn(|axis| without_tool[axis] - offset[axis]);
+        rotate(&mut reading, -rotation_deg);
+        for (axis, reading) in reading.iter_mut().enumerate() {
+            if let Some(value) = block.axis(axis) {
+                *reading = value + self.g92[axis];
+            }
+        }
+        rotate(&mut reading, rotation_deg);
+        let together = rotation_deg != 0.0 && block.has_any(b"XY");
+        for axis in 0..9 {
+            if block.axis(axis).is_some() || (axis < 2 && together) {
+                offset[axis] = without_tool[axis] - reading[axis];
+            }
         }
     }
 
@@ -123,7 +138,9 @@ impl State {
         let by = self.end_point(block)?;
         out.emit(Canon::StraightTraverse(Position::from_array(by)));
         let first = if code == G28 { parameters::G28_HOME } else { parameters::G30_HOME };
-        let home = self.program_point(self.program_units(self.parameters.nine(first)));
+        let mut home = self.program_units(self.parameters.nine(first));
+        self.keep_rotary_tool_offset(&mut home);
+        let home = self.program_point(home);
         let all = !block.has_axis();
         let end = core::array::from_fn(
             |axis| {
@@ -133,6 +150,15 @@ impl State {
         self.position = end;
         out.emit(Canon::StraightTraverse(Position::from_array(end)));
         Ok(())
+    }
+
+    /// LinuxCNC does not take the tool offset of A B C off machine coordinates (G28, G30, G53); pkm does.
+    pub(crate) fn keep_rotary_tool_offset(&self, machine: &mut [f64; 9]) {
+        if self.settings.dialect != Dialect::Pkm {
+            for axis in 3..6 {
+                machine[axis] += self.tool_offset[axis];
+            }
+        }
     }
 
     /// G28.1, G30.1: stores the machine point.

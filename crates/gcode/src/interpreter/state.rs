@@ -28,6 +28,8 @@ pub(crate) struct State {
     pub(crate) g92: [f64; 9],
     pub(crate) tool_offset: [f64; 9],
     pub(crate) rotation_deg: f64,
+    /// Slot of the tool in the spindle; 0 = none.
+    pub(crate) loaded_slot: i32,
     /// Line of the block being read.
     pub(crate) source_line: u32,
 }
@@ -44,6 +46,8 @@ impl State {
             g92: [0.0; 9],
             tool_offset: [0.0; 9],
             rotation_deg: 0.0,
+            // rs274 begins with slot 1 in force and an empty spindle.
+            loaded_slot: i32::from(settings.imitates_rs274),
             source_line: 0,
         }
     }

@@ -1,6 +1,9 @@
 //! Tools: T, M6, M61, tool length offsets (G43, G43.1, G43.2, G49), tool table settings (G10 L1, L10, L11).
 
-use super::{Out, state::State};
+use super::{
+    Out,
+    state::{State, rotate},
+};
 use crate::block::Block;
 use crate::error::{Error, ErrorKind};
 use crate::modal::*;
@@ -42,6 +45,7 @@ impl State {
                 let (slot, tool) = (self.modal.selected_slot, self.modal.selected_tool);
                 out.emit(Canon::ChangeTool { slot, tool });
                 self.tools.load_spindle(slot);
+                self.loaded_slot = slot;
                 Ok(true)
             }
             Some(number) => {
@@ -59,7 +63,10 @@ impl State {
                     return Err(block.word_error(b'Q', ErrorKind::ToolUnknown { number: tool }));
                 };
                 out.emit(Canon::ChangeToolNumber { slot, tool });
-                self.tools.load_spindle(slot);
+                self.loaded_slot = slot;
+                if !self.settings.imitates_rs274 {
+                    self.tools.load_spindle(slot);
+                }
                 Ok(true)
             }
             None => Ok(false),
@@ -134,8 +141,7 @@ impl State {
             *row = tool;
         }
         out.emit(Canon::SetToolTableEntry { slot, tool: &tool });
-        let loaded = self.tools.get(0).is_some_and(|spindle| spindle.number == number);
-        if loaded {
+        if slot == self.loaded_slot {
             self.tools.load_spindle(slot);
             out.emit(Canon::SetToolTableEntry { slot: 0, tool: &tool });
         }
@@ -147,7 +153,7 @@ impl State {
         let mut offset = tool.offset.to_array();
         let values: [Option<f64>; 9] = match l {
             1 => core::array::from_fn(|axis| block.axis(axis)),
-            _ => self.tool_offset_for_reading(l, block),
+            _ => self.tool_offset_for_reading(l, &offset, block),
         };
         for axis in 0..9 {
             if let Some(value) = values[axis] {
@@ -179,9 +185,9 @@ impl State {
     }
 
     /// L10: the tool offset with which the present point reads the given values in the active system; L11: in
-    /// G59.3, without G92.
-    fn tool_offset_for_reading(&self, l: i32, block: &Block) -> [Option<f64>; 9] {
-        let machine = self.machine_point(self.position);
+    /// G59.3, without G92. Axes without a word keep their part of the present offset *along the system's axes*, so
+    /// in a turned system X and Y change together.
+    fn tool_offset_for_reading(&self, l: i32, present: &[f64; 9], block: &Block) -> [Option<f64>; 9] {
         let (system, rotation, g92) = match l {
             10 => (self.g5x, self.rotation_deg, self.g92),
             _ => {
@@ -190,9 +196,20 @@ impl State {
                 (offset, self.parameters.get(first + 9), [0.0; 9])
             }
         };
-        let mut wanted: [f64; 9] =
-            core::array::from_fn(|axis| block.axis(axis).unwrap_or(self.position[axis]) + g92[axis]);
-        super::state::rotate(&mut wanted, rotation);
-        core::array::from_fn(|axis| block.axis(axis).map(|_| machine[axis] - system[axis] - wanted[axis]))
+        let machine = self.machine_point(self.position);
+        let mut reading: [f64; 9] = core::array::from_fn(|axis| machine[axis] - system[axis]);
+        rotate(&mut reading, -rotation);
+        let mut offset = self.program_units(*present);
+        rotate(&mut offset, -rotation);
+        for (axis, offset) in offset.iter_mut().enumerate() {
+            if let Some(value) = block.axis(axis) {
+                *offset = reading[axis] - g92[axis] - value;
+            }
+        }
+        rotate(&mut offset, rotation);
+        let together = rotation != 0.0 && block.has_any(b"XY");
+        core::array::from_fn(|axis| {
+            (block.axis(axis).is_some() || (axis < 2 && together)).then_some(offset[axis])
+        })
     }
 }

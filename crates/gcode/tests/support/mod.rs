@@ -1,0 +1,139 @@
+//! Running a program through pkm and through LinuxCNC's `rs274`, and comparing the two.
+#![allow(dead_code, missing_docs, unreachable_pub)]
+
+pub mod generator;
+
+use pkm_canon::text::{Spelling, TextWriter};
+use pkm_gcode::{MemorySource, Settings, ToolTable, canon_text};
+use std::path::Path;
+use std::process::Command;
+
+/// What came out of a program: its canonical lines, and the source text of the block that failed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    pub lines: Vec<String>,
+    pub failed_block: Option<String>,
+    pub message: String,
+}
+
+/// The tool table that both sides use.
+pub const TOOLS: &str = "T1 P1 D0.125 Z+0.511\nT2 P2 D0.0625 Z+0.1\nT3 P3 D0.201 Z+1.273\n\
+                         T4 P4 D0.25 X+0.3 Z+0.7 I20 J-20 Q2\nT99999 P123 Z+0.1\n";
+
+fn text_of(bytes: &[u8]) -> String {
+    bytes.iter().map(|&b| char::from(b)).collect()
+}
+
+fn stream(text: &[u8]) -> Vec<String> {
+    let mut lines: Vec<String> = text_of(text).lines().map(str::to_string).collect();
+    while lines.last().is_some_and(|line| line.ends_with("ON_RESET()")) {
+        lines.pop();
+    }
+    lines
+}
+
+/// The program as pkm interprets it, on the machine that `rs274` simulates.
+pub fn pkm(program: &[u8]) -> Outcome {
+    let tools = ToolTable::parse(TOOLS.as_bytes(), |_, _| {}).expect("a small table");
+    let mut output: Vec<u8> = Vec::new();
+    let mut writer = TextWriter::new(|bytes: &[u8]| output.extend_from_slice(bytes), Spelling::V2_9);
+    let (mut failed_block, mut message) = (None, String::new());
+    let mut source = MemorySource::new(program);
+    canon_text(Settings::rs274(), tools, &mut source, &mut writer, |error, line| {
+        failed_block = Some(text_of(line));
+        message = format!("[{}] {error} at {:?}", error.kind.code(), error.span);
+        false
+    });
+    drop(writer);
+    Outcome { lines: stream(&output), failed_block, message }
+}
+
+/// True if LinuxCNC's interpreter is installed.
+pub fn has_rs274() -> bool {
+    Command::new("rs274").arg("-h").output().is_ok()
+}
+
+/// The program as `rs274 -g` interprets it; `None` if it does not end in time.
+pub fn rs274(program: &[u8], directory: &Path) -> Option<Outcome> {
+    let file = directory.join("program.ngc");
+    let tools = directory.join("tool.tbl");
+    write(&file, program);
+    write(&tools, TOOLS.as_bytes());
+    let output = Command::new("timeout")
+        .args(["10", "rs274", "-t", "tool.tbl", "-g", "program.ngc"])
+        .current_dir(directory)
+        .output()
+        .expect("rs274 runs");
+    if output.status.code() == Some(124) {
+        return None;
+    }
+    let talk = text_of(&output.stderr);
+    let talk: Vec<&str> = talk.lines().collect();
+    let failed = !output.status.success();
+    Some(Outcome {
+        lines: stream(&output.stdout),
+        failed_block: failed.then(|| talk.last().map(|line| line.to_string()).unwrap_or_default()),
+        message: if failed { talk[talk.len().saturating_sub(2)].to_string() } else { String::new() },
+    })
+}
+
+#[allow(clippy::disallowed_methods)] // scratch files of a test need no atomic write
+pub fn write(path: &Path, bytes: &[u8]) {
+    std::fs::write(path, bytes).expect("a writable directory");
+}
+
+/// The first difference, if there is one: numbers may differ by 1e-4, everything else not at all.
+pub fn difference(oracle: &Outcome, ours: &Outcome) -> Option<String> {
+    for i in 0..oracle.lines.len().max(ours.lines.len()) {
+        let (a, b) = (oracle.lines.get(i), ours.lines.get(i));
+        if !matches!((a, b), (Some(a), Some(b)) if same_line(a, b)) {
+            return Some(format!(
+                "canonical line {}\n  rs274: {}\n  pkm:   {}\n  rs274 says {:?}\n  pkm says   {:?}",
+                i + 1,
+                a.map_or("(none)", String::as_str),
+                b.map_or("(none)", String::as_str),
+                oracle.message,
+                ours.message
+            ));
+        }
+    }
+    // What rs274 repeats of the source line ends at a NUL and its own line length; compare what it shows.
+    let block = |outcome: &Outcome| outcome.failed_block.as_ref().map(|text| text.trim().to_string());
+    if block(oracle) != block(ours) {
+        return Some(format!(
+            "failing block\n  rs274: {:?} {:?}\n  pkm:   {:?} {:?}",
+            oracle.failed_block, oracle.message, ours.failed_block, ours.message
+        ));
+    }
+    None
+}
+
+fn same_line(a: &str, b: &str) -> bool {
+    if a == b {
+        return true;
+    }
+    let (a, b) = (pieces(a), pieces(b));
+    a.len() == b.len()
+        && a.iter().zip(&b).all(|(a, b)| match (a.parse::<f64>(), b.parse::<f64>()) {
+            (Ok(x), Ok(y)) if a.contains('.') && b.contains('.') => {
+                (x - y).abs() <= 1.01e-4_f64.max(x.abs() * 1e-9)
+            }
+            _ => a == b,
+        })
+}
+
+/// A line cut into numbers and what is between them.
+fn pieces(line: &str) -> Vec<&str> {
+    let is_number = |b: u8| b.is_ascii_digit() || b == b'.' || b == b'-';
+    let mut pieces = Vec::new();
+    let (mut start, bytes) = (0, line.as_bytes());
+    for i in 1..=bytes.len() {
+        if i == bytes.len() || is_number(bytes[i]) != is_number(bytes[i - 1]) {
+            if let Some(piece) = line.get(start..i) {
+                pieces.push(piece);
+            }
+            start = i;
+        }
+    }
+    pieces
+}
