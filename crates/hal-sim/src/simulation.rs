@@ -198,6 +198,7 @@ pub struct Simulation {
     period: Period,
     servo_period_ns: u64,
     axes: AxisSet,
+    enable: BitPin,
     tick: u64,
     /// Edges of the period in order of time, per joint and of all.
     joint_edges: Vec<Vec<Edge>>,
@@ -250,6 +251,7 @@ impl Simulation {
 
         let mut simulation = Self {
             lines: lines(&hal, config)?,
+            enable: hal.bit_pin("motion.enable")?,
             hal,
             states: vec![JointState::default(); count],
             statistics: vec![JointStatistics::default(); count],
@@ -299,6 +301,37 @@ impl Simulation {
     ) -> Result<TickReport<'_>, Fault> {
         self.hal.run(Some(setpoint))?;
         self.setpoint = *setpoint;
+        Ok(self.conclude(observers))
+    }
+
+    /// Emergency stop (category 0): from the next period on the drives are off and no step begins. The simulation must
+    /// then be driven with [`Self::idle`]; [`Self::reset`] ends it.
+    pub fn emergency_stop(&mut self) {
+        self.hal.values_mut().set_bit(self.enable, false);
+    }
+
+    /// Ends the emergency stop. The machine stands where the steps stand: [`Self::feedback`]; setpoints start there.
+    pub fn reset(&mut self) {
+        self.hal.values_mut().set_bit(self.enable, true);
+    }
+
+    /// Runs one servo period without a setpoint: after an emergency stop, or at rest.
+    ///
+    /// # Errors
+    /// The fault of a component.
+    pub fn idle(&mut self, observers: &mut [&mut dyn Observer]) -> Result<TickReport<'_>, Fault> {
+        self.hal.run(None)?;
+        self.setpoint.velocities = [0.0; MAX_JOINTS];
+        if !self.hal.values().bit(self.enable) {
+            self.setpoint.in_position = false;
+            for (n, generator) in part::<Stepgen>(&self.hal, STEPGEN).generators().enumerate() {
+                self.setpoint.joints[n] = generator.count() as f64 / self.lines[n].steps_per_unit;
+            }
+        }
+        Ok(self.conclude(observers))
+    }
+
+    fn conclude(&mut self, observers: &mut [&mut dyn Observer]) -> TickReport<'_> {
         self.tick += 1;
         let ordered = observers.iter().any(|observer| observer.wants_edges());
         self.judge(ordered);
@@ -315,7 +348,7 @@ impl Simulation {
         for observer in observers {
             observer.tick(&report);
         }
-        Ok(report)
+        report
     }
 
     /// Counts the edges of the period and compares them with the command.
@@ -503,6 +536,8 @@ fn wire(hal: &mut Hal, joints: usize) -> Result<(), HalError> {
             ("vel-cmd", "joint.N.vel-cmd", "stepgen.N.velocity-cmd"),
             ("step", "stepgen.N.step", "driver.N.step"),
             ("dir", "stepgen.N.dir", "driver.N.dir"),
+            ("enable", "joint.N.amp-enable-out", "stepgen.N.enable"),
+            ("enable", "joint.N.amp-enable-out", "driver.N.enable"),
             ("counts", "driver.N.counts", "motor.N.counts"),
             ("motor-pos", "motor.N.position", "joint.N.motor-pos-fb"),
         ] {

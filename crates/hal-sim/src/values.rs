@@ -139,14 +139,17 @@ impl EdgeQueue {
         self.first += past as u64;
     }
 
-    /// Drops the edges after `time`, but leaves the end of a pulse that has begun. Returns how many were dropped.
-    pub fn cut_after(&mut self, time: u64) -> usize {
+    /// The edges that have not been retired.
+    pub fn edges(&self) -> &[LineEdge] {
+        &self.edges
+    }
+
+    /// Drops the edges after `time`, but leaves the end of a pulse that has begun; `level` is that of the line before
+    /// the first edge here.
+    pub fn cut_after(&mut self, time: u64, level: bool) {
         let past = self.until(time);
-        let high = past > 0 && self.edges[past - 1].level;
-        let keep = (past + usize::from(high)).min(self.edges.len());
-        let dropped = self.edges.len() - keep;
-        self.edges.truncate(keep);
-        dropped
+        let high = past.checked_sub(1).map_or(level, |last| self.edges[last].level);
+        self.edges.truncate(past + usize::from(high));
     }
 
     /// The edges that the cursor has not seen, up to and including `until`; moves the cursor past them.

@@ -149,6 +149,8 @@ fn a_turn_just_beyond_a_half_step_makes_no_pair() {
     let motion = Motion { p0: 0.4, p1: 0.501, m0: 0.4, m1: -0.02 };
     let (_, found, end) = crossings(&motion, &period, 10).unwrap();
     assert_eq!((found.len(), end), (1, 1));
+    // 0.4 − 0.954 u + 0.534 u² = 0 at u = 0.6723
+    assert!(found[0].0.abs_diff(TICKS + 672_300) < 100, "{found:?}");
 }
 
 #[test]

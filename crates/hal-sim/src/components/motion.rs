@@ -9,6 +9,8 @@
 //! | `joint.N.pos-fb`         | float out | `motor-pos-fb` as it was at the beginning of the period    |
 //! | `joint.N.f-error`        | float out | commanded less actual position there                       |
 //! | `axis.L.pos-cmd`         | float out | commanded pose, mm or degrees                              |
+//! | `joint.N.amp-enable-out` | bit out   | the joint's drive is to be on                              |
+//! | `motion.enable`          | bit in    | false (emergency stop): drives off, commands follow `motor-pos-fb` |
 //! | `motion.in-position`     | bit out   | nothing moves and nothing is waiting                       |
 //! | `motion.program-line`    | s32 out   | line of the block under way                                |
 //!
@@ -45,6 +47,7 @@ struct JointPins {
     motor_pos_fb: FloatPin,
     pos_fb: FloatPin,
     f_error: FloatPin,
+    amp_enable_out: BitPin,
 }
 
 /// See the module.
@@ -52,6 +55,7 @@ struct JointPins {
 pub struct Motion {
     joints: Vec<(MotionJoint, JointPins)>,
     axes: Vec<(Axis, FloatPin)>,
+    enable: BitPin,
     in_position: BitPin,
     program_line: S32Pin,
     /// mm or rad
@@ -63,6 +67,14 @@ fn shown(kind: JointKind, value: f64) -> f64 {
     match kind {
         JointKind::Linear => value,
         JointKind::Rotary => maths::degrees(value),
+    }
+}
+
+/// mm stay mm, degrees become rad.
+fn kept(kind: JointKind, value: f64) -> f64 {
+    match kind {
+        JointKind::Linear => value,
+        JointKind::Rotary => maths::radians(value),
     }
 }
 
@@ -88,6 +100,12 @@ impl Motion {
                 motor_pos_fb: float("motor-pos-fb", Role::In, start)?,
                 pos_fb: float("pos-fb", Role::Out, start)?,
                 f_error: float("f-error", Role::Out, 0.0)?,
+                amp_enable_out: hal.new_bit(
+                    "motion",
+                    &format!("joint.{n}.amp-enable-out"),
+                    Role::Out,
+                    true,
+                )?,
             };
             with_pins.push((*joint, pins));
         }
@@ -99,6 +117,7 @@ impl Motion {
         let motion = Self {
             joints: with_pins,
             axes: axis_pins,
+            enable: hal.new_bit("motion", "motion.enable", Role::In, true)?,
             in_position: hal.new_bit("motion", "motion.in-position", Role::Out, true)?,
             program_line: hal.new_s32("motion", "motion.program-line", Role::Out, 0)?,
             last: joints.iter().map(|joint| joint.start).collect(),
@@ -147,6 +166,21 @@ impl Motion {
             let position = values.float(pins.motor_pos_fb);
             values.set_float(pins.pos_fb, position);
             values.set_float(pins.f_error, values.float(pins.pos_cmd) - position);
+        }
+        let enabled = values.bit(self.enable);
+        for (_, pins) in &self.joints {
+            values.set_bit(pins.amp_enable_out, enabled);
+        }
+        if !enabled {
+            for ((joint, pins), last) in self.joints.iter().zip(&mut self.last) {
+                let position = values.float(pins.motor_pos_fb);
+                values.set_float(pins.pos_cmd, position);
+                values.set_float(pins.motor_pos_cmd, position);
+                values.set_float(pins.vel_cmd, 0.0);
+                *last = kept(joint.kind, position);
+            }
+            values.set_bit(self.in_position, false);
+            return Ok(());
         }
         let Some(setpoint) = tick.setpoint else {
             for (_, pins) in &self.joints {

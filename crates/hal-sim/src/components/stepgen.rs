@@ -4,7 +4,7 @@
 //! |------------------------------|-----------|----------------------------------------------------------------|
 //! | `stepgen.N.position-cmd`     | float in  | position at the end of the period, mm or degrees               |
 //! | `stepgen.N.velocity-cmd`     | float in  | velocity there, mm/s or degrees/s                              |
-//! | `stepgen.N.enable`           | bit in    | false: no new steps; the command is taken up where the steps stand |
+//! | `stepgen.N.enable`           | bit in    | false: no step begins; the generator stands where the steps stand |
 //! | `stepgen.N.step`, `.dir`     | bit out   | the lines, with their edges inside the period; dir high = positive |
 //! | `stepgen.N.counts`           | s32 out   | steps so far (wraps)                                           |
 //! | `stepgen.N.position-fb`      | float out | counts / scale                                                 |
@@ -19,7 +19,7 @@
 
 use crate::component::{Component, Fault, Tick};
 use crate::hal::{Hal, HalError, Role};
-use crate::values::{BitPin, FloatPin, S32Pin, U32Pin, Values};
+use crate::values::{BitPin, EdgeQueue, FloatPin, LineEdge, S32Pin, U32Pin, Values};
 use pkm_stepgen::{EdgeError, Line, PulseTimingNs, StepGenerator};
 
 /// One channel as configured.
@@ -117,19 +117,23 @@ impl Stepgen {
     fn update(&mut self, values: &mut Values, tick: &Tick<'_>) -> Result<(), Fault> {
         let (start, end) = (tick.period.start(), tick.period.end());
         for (n, (generator, pins)) in self.channels.iter_mut().enumerate() {
-            let (position, velocity) = if values.bit(pins.enable) {
-                (values.float(pins.position_cmd), values.float(pins.velocity_cmd))
-            } else {
-                (generator.position_of(generator.count()), 0.0)
-            };
+            let enabled = values.bit(pins.enable);
             let mut steps = values.take_edges(pins.step);
             let mut turns = values.take_edges(pins.dir);
             steps.retire(start);
             turns.retire(start);
-            let result = generator.advance(position, velocity, &tick.period, |edge| match edge.line {
-                Line::Step => steps.push(edge.time, edge.level),
-                Line::Dir => turns.push(edge.time, edge.level),
-            });
+            let result = if enabled {
+                let (position, velocity) = (values.float(pins.position_cmd), values.float(pins.velocity_cmd));
+                generator.advance(position, velocity, &tick.period, |edge| match edge.line {
+                    Line::Step => steps.push(edge.time, edge.level),
+                    Line::Dir => turns.push(edge.time, edge.level),
+                })
+            } else {
+                // steps that were to come late do not come; a pulse that has begun ends
+                let missing = net_steps(&steps, &turns, values.bit(pins.dir));
+                steps.cut_after(start, values.bit(pins.step));
+                generator.stand_at(generator.count() - missing)
+            };
             values.put_edges(pins.step, steps, end);
             values.put_edges(pins.dir, turns, end);
             result.map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error })?;
@@ -145,6 +149,12 @@ impl Stepgen {
             values.set_u32(pins.max_delay, delay);
         }
     }
+}
+
+/// Steps forward less steps back on lines of which `dir` is the direction's level before the first edge.
+fn net_steps(steps: &EdgeQueue, turns: &EdgeQueue, dir: bool) -> i64 {
+    let step = |edge: &LineEdge| if turns.level_at(edge.time).unwrap_or(dir) { 1 } else { -1 };
+    steps.edges().iter().filter(|edge| edge.level).map(step).sum()
 }
 
 fn nanoseconds(ticks: u64, timer_period_ns: u64) -> u32 {
