@@ -6,11 +6,15 @@
 // `!(x >= y)` is how NaN ends on the side of the error.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
+mod attitude;
 pub mod cartesian;
 pub mod errors;
+pub mod hexapod;
 pub mod hv_machine;
 pub mod hv_mill;
 pub mod kinematics;
+pub mod lambda6;
+pub mod linear_delta;
 pub mod machine;
 pub mod maths;
 pub mod moma;
@@ -19,17 +23,19 @@ pub mod moma_w;
 pub mod ox_glide;
 pub mod planar;
 pub mod pose;
-#[allow(dead_code)]
 pub mod vector;
 
 pub use cartesian::Cartesian;
 pub use errors::{ForwardError, GeometryError, InverseError, Key, NoIntersection};
+pub use hexapod::{Hexapod, HexapodParameters};
 pub use hv_machine::{HvMachine, HvMachineParameters, HvSideParameters};
 pub use hv_mill::{HeadParameters, HvMill, HvMillParameters, HvState, Spindle, Turn, delta_t_workpiece};
 pub use kinematics::{
     Branches, Jacobian, JointKind, JointLimit, JointMotion, JointRange, Joints, Kinematics, LimitCode,
     MAX_JOINTS, Side, Singularity,
 };
+pub use lambda6::{Lambda6, Lambda6Parameters, Lambda6Set};
+pub use linear_delta::{LinearDelta, LinearDeltaParameters};
 pub use machine::Mechanism;
 pub use moma::{Moma, MomaConfiguration, MomaParameters};
 pub use moma_4s::{Moma4s, Moma4sConfiguration, Moma4sParameters};

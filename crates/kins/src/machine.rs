@@ -2,11 +2,14 @@
 
 use crate::cartesian::Cartesian;
 use crate::errors::{ForwardError, InverseError};
+use crate::hexapod::Hexapod;
 use crate::hv_machine::HvMachine;
 use crate::hv_mill::HvMill;
 use crate::kinematics::{
     Branches, Jacobian, JointKind, JointLimit, JointMotion, Joints, Kinematics, LimitCode, Singularity,
 };
+use crate::lambda6::Lambda6;
+use crate::linear_delta::LinearDelta;
 use crate::moma::Moma;
 use crate::moma_4s::Moma4s;
 use crate::moma_w::MomaW;
@@ -27,6 +30,16 @@ macro_rules! mechanisms {
         #[allow(clippy::large_enum_variant)] // no heap: the largest one sets the size
         pub enum Mechanism {
             $($(#[$doc])* $name($kind)),+
+        }
+
+        impl Mechanism {
+            /// The name of every kind of mechanism.
+            pub const KINDS: &'static [&'static str] = &[$(stringify!($name)),+];
+
+            /// Which kind this one is: an entry of [`Self::KINDS`].
+            pub const fn kind(&self) -> &'static str {
+                match self { $(Self::$name(_) => stringify!($name)),+ }
+            }
         }
 
         $(impl From<$kind> for Mechanism {
@@ -93,6 +106,12 @@ mechanisms! {
     HvMachine(HvMachine),
     /// Two forms on one rail.
     OxGlide(OxGlide),
+    /// Six sliders on three shafts.
+    Lambda6(Lambda6),
+    /// Three carriages on vertical columns.
+    LinearDelta(LinearDelta),
+    /// Six struts of variable length.
+    Hexapod(Hexapod),
 }
 
 impl Mechanism {
@@ -102,6 +121,7 @@ impl Mechanism {
         match self {
             Self::MomaW(m) => Self::MomaW(m.without_limits()),
             Self::OxGlide(m) => Self::OxGlide(m.without_limits()),
+            Self::Lambda6(m) => Self::Lambda6(m.without_limits()),
             other => other,
         }
     }

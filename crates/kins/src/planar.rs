@@ -316,7 +316,8 @@ impl Planar {
         if !(d > EDGE * far) {
             return none(NoIntersection::Coincident);
         }
-        let (stretched, fold1, fold2) = (far - d, d + l1 - l2, d - l1 + l2);
+        // l₁ − l₂ first: near coincident centres d is far smaller than either.
+        let (stretched, fold1, fold2) = (far - d, d + (l1 - l2), d - (l1 - l2));
         if stretched < -EDGE * far {
             return none(NoIntersection::TooFar);
         }

@@ -1,0 +1,392 @@
+//! Hexapod (Stewart-Gough platform): six struts of variable length between base and platform points.
+//!
+//! Source: geometry and conventions of LinuxCNC's `genhexkins` (manual page: base and platform coordinates per strut, A B C as
+//! roll, pitch, yaw), so that results compare like for like; the solver here is our own.
+//! Frame: base, mm and rad. Machine axes X Y Z A B C, R = Rz(C) Ry(B) Rx(A). Joints 1..6 = strut lengths, mm.
+//!
+//! | here          | genhexkins | meaning                                     |
+//! |---------------|------------|---------------------------------------------|
+//! | `base_mm`     | base       | strut ends on the base                      |
+//! | `platform_mm` | platform   | strut ends on the platform, platform frame  |
+//!
+//! Inverse: Lᵢ = |p + R aᵢ − bᵢ|, closed form.
+//! Forward: Newton on the six lengths from the seed (at most 32 steps, each a 6×6 elimination with pivoting, steps limited);
+//!   up to 40 poses fit six lengths, the one found is that of the seed's assembly (the sign of det J is kept). A seed of all
+//!   zeros means none: then the start is (0, 0, `start_z_mm`) level.
+//! Singular: no inverse singularity while no strut has length 0; forward where det J = 0, measured by the reciprocal
+//!   condition number of J with angles times the platform's radius.
+//! Accuracy: forward(inverse(p)) within 1e-8 mm, 1e-10 rad where the measure is above 1e-3.
+//! Not modelled: the lead screws' own turn when universal joints twist (genhexkins' screw lead), strut collisions.
+
+use crate::attitude::Attitude;
+use crate::errors::{self, ForwardError, GeometryError, InverseError, Key};
+use crate::kinematics::{Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity};
+use crate::maths::{PI, TAU, cos, fabs, floor, sin, sqrt};
+use crate::pose::{Axis, AxisSet, Pose};
+use crate::vector::{Vec3, add, cross, dot, norm, scale, sub};
+
+/// Hexapod as written in a machine file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+pub struct HexapodParameters {
+    /// bᵢ, mm.
+    pub base_mm: [Vec3; 6],
+    /// aᵢ in the platform frame, mm.
+    pub platform_mm: [Vec3; 6],
+    /// Height at which forward starts without a seed, mm.
+    pub start_z_mm: f64,
+}
+
+impl HexapodParameters {
+    /// A symmetric 6-6 hexapod: joints in three pairs on each circle, pairs `base_spread_rad` and `platform_spread_rad` wide
+    /// (between the two joints of a pair), the platform's pairs turned by 60° against the base's.
+    pub fn symmetric(
+        base_radius_mm: f64,
+        base_spread_rad: f64,
+        platform_radius_mm: f64,
+        platform_spread_rad: f64,
+        start_z_mm: f64,
+    ) -> Self {
+        let mut p = Self { base_mm: [[0.0; 3]; 6], platform_mm: [[0.0; 3]; 6], start_z_mm };
+        let mut number = 0.0;
+        for (base, platform) in p.base_mm.iter_mut().zip(p.platform_mm.iter_mut()) {
+            // Struts 0, 2, 4 leave a base pair to the left, 1, 3, 5 to the right.
+            let pair = floor(number / 2.0);
+            let hand = number - 2.0 * pair - 0.5;
+            let base_at = pair * TAU / 3.0 + hand * base_spread_rad;
+            let platform_at = pair * TAU / 3.0 + hand * (TAU / 3.0 - platform_spread_rad);
+            *base = [base_radius_mm * cos(base_at), base_radius_mm * sin(base_at), 0.0];
+            *platform = [platform_radius_mm * cos(platform_at), platform_radius_mm * sin(platform_at), 0.0];
+            number += 1.0;
+        }
+        p
+    }
+}
+
+/// A valid hexapod.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hexapod {
+    base: [Vec3; 6],
+    platform: [Vec3; 6],
+    /// Radius of the platform points: makes angles comparable with lengths.
+    radius: f64,
+    start_z: f64,
+}
+
+/// One strut: R a, direction base → platform, length.
+#[derive(Debug, Clone, Copy, Default)]
+struct Strut {
+    arm: Vec3,
+    unit: Vec3,
+    length: f64,
+}
+
+impl Hexapod {
+    /// A hexapod from its parameters.
+    ///
+    /// # Errors
+    /// `NotFinite`, `OutOfRange` name the parameter; `DegeneratePoints` if base or platform points all lie in one line.
+    pub fn new(p: &HexapodParameters) -> Result<Self, GeometryError> {
+        for (name, points) in [("base_mm", &p.base_mm), ("platform_mm", &p.platform_mm)] {
+            for (i, point) in points.iter().enumerate() {
+                for &value in point {
+                    errors::coordinate(Key::at(name, i), value)?;
+                }
+            }
+            let mut area = 0.0_f64;
+            let [first, rest @ ..] = points;
+            for u in rest {
+                for v in rest {
+                    area = area.max(norm(cross(sub(*u, *first), sub(*v, *first))));
+                }
+            }
+            if area < 1e-6 {
+                return Err(GeometryError::DegeneratePoints { key: Key::of(name) });
+            }
+        }
+        let mut radius = 0.0_f64;
+        for point in &p.platform_mm {
+            radius = radius.max(norm(*point));
+        }
+        let start_z = errors::coordinate(Key::of("start_z_mm"), p.start_z_mm)?;
+        Ok(Self { base: p.base_mm, platform: p.platform_mm, radius, start_z })
+    }
+
+    /// Radius of the platform points, mm.
+    pub fn platform_radius_mm(&self) -> f64 {
+        self.radius
+    }
+
+    #[inline]
+    fn struts(&self, pose: &Pose, at: &Attitude) -> Result<[Strut; 6], InverseError> {
+        let mut struts = [Strut::default(); 6];
+        for (((strut, a), b), joint) in struts.iter_mut().zip(&self.platform).zip(&self.base).zip(0u8..) {
+            let arm = at.rotate(*a);
+            let d = sub(add([pose.x, pose.y, pose.z], arm), *b);
+            let length = norm(d);
+            if !(length > 1e-9) {
+                return Err(InverseError::ZeroStrut { joint });
+            }
+            *strut = Strut { arm, unit: scale(1.0 / length, d), length };
+        }
+        Ok(struts)
+    }
+
+    fn reach(&self, pose: &Pose) -> Result<(Attitude, [Strut; 6]), InverseError> {
+        // 1e12 mm: far beyond any machine, near enough that squares stay finite.
+        let place = [pose.x, pose.y, pose.z];
+        if !(pose.is_finite() && fabs(place[0]).max(fabs(place[1])).max(fabs(place[2])) < 1e12) {
+            return Err(InverseError::NotFinite);
+        }
+        let at = Attitude::of(pose);
+        let struts = self.struts(pose, &at)?;
+        Ok((at, struts))
+    }
+
+    /// ∂L/∂(v, ω r): rows (u, (R a × u)/r), dimensionless.
+    fn scaled_rows(&self, struts: &[Strut; 6]) -> [[f64; 6]; 6] {
+        let mut rows = [[0.0; 6]; 6];
+        for (row, strut) in rows.iter_mut().zip(struts) {
+            let [mx, my, mz] = scale(1.0 / self.radius, cross(strut.arm, strut.unit));
+            let [ux, uy, uz] = strut.unit;
+            *row = [ux, uy, uz, mx, my, mz];
+        }
+        rows
+    }
+
+    fn lengths(struts: &[Strut; 6]) -> Joints {
+        let mut joints = [0.0; MAX_JOINTS];
+        for (joint, strut) in joints.iter_mut().zip(struts) {
+            *joint = strut.length;
+        }
+        joints
+    }
+}
+
+impl TryFrom<HexapodParameters> for Hexapod {
+    type Error = GeometryError;
+    fn try_from(parameters: HexapodParameters) -> Result<Self, GeometryError> {
+        Self::new(&parameters)
+    }
+}
+
+/// A linear system with six unknowns, solved by elimination with row pivoting. By hand: nalgebra's `lu().solve()` can panic.
+struct Solved {
+    x: [f64; 6],
+    determinant: f64,
+}
+
+/// Solves rows · x = right; `None` if a pivot is below 1e-14 (the rows here have entries of order 1).
+fn solve(rows: &[[f64; 6]; 6], right: &[f64; 6]) -> Option<Solved> {
+    let mut m = [[0.0; 7]; 6];
+    for ((full, row), r) in m.iter_mut().zip(rows).zip(right) {
+        full[..6].copy_from_slice(row);
+        full[6] = *r;
+    }
+    let mut determinant = 1.0;
+    for column in 0..6 {
+        let mut best = column;
+        let mut size = 0.0;
+        for (i, row) in m.iter().enumerate().skip(column) {
+            let entry = fabs(*row.get(column)?);
+            if entry > size {
+                (best, size) = (i, entry);
+            }
+        }
+        if !(size > 1e-14) {
+            return None;
+        }
+        if best != column {
+            // `swap` without an index that could be out of range.
+            let (above, below) = m.split_at_mut(best);
+            core::mem::swap(above.get_mut(column)?, below.first_mut()?);
+            determinant = -determinant;
+        }
+        let (done, below) = m.split_at_mut(column + 1);
+        let pivot = done.last()?;
+        let head = *pivot.get(column)?;
+        determinant *= head;
+        for row in below {
+            let factor = *row.get(column)? / head;
+            for (entry, p) in row.iter_mut().zip(pivot).skip(column) {
+                *entry -= factor * p;
+            }
+        }
+    }
+    let mut x = [0.0; 6];
+    for column in (0..6).rev() {
+        let row = m.get(column)?;
+        let mut sum = row[6];
+        for (entry, known) in row.iter().zip(&x).skip(column + 1) {
+            sum -= entry * known;
+        }
+        *x.get_mut(column)? = sum / *row.get(column)?;
+    }
+    Some(Solved { x, determinant })
+}
+
+/// 1/(‖A‖∞ ‖A⁻¹‖∞); 0 for a singular matrix.
+fn reciprocal_condition(rows: &[[f64; 6]; 6]) -> f64 {
+    let mut inverse_rows = [0.0; 6];
+    for column in 0..6 {
+        let mut unit = [0.0; 6];
+        if let Some(one) = unit.get_mut(column) {
+            *one = 1.0;
+        }
+        match solve(rows, &unit) {
+            None => return 0.0,
+            Some(solved) => {
+                for (sum, x) in inverse_rows.iter_mut().zip(solved.x) {
+                    *sum += fabs(x);
+                }
+            }
+        }
+    }
+    let mut largest = 0.0_f64;
+    for row in rows {
+        let mut sum = 0.0;
+        for entry in row {
+            sum += fabs(*entry);
+        }
+        largest = largest.max(sum);
+    }
+    let mut largest_inverse = 0.0_f64;
+    for sum in inverse_rows {
+        largest_inverse = largest_inverse.max(sum);
+    }
+    1.0 / (largest * largest_inverse)
+}
+
+impl Kinematics for Hexapod {
+    fn joint_count(&self) -> usize {
+        6
+    }
+
+    fn axes(&self) -> AxisSet {
+        AxisSet::new(&[Axis::X, Axis::Y, Axis::Z, Axis::A, Axis::B, Axis::C])
+    }
+
+    fn joint_kind(&self, _: usize) -> JointKind {
+        JointKind::Linear
+    }
+
+    fn joint_code(&self, joint: usize) -> (&'static str, &'static str) {
+        ("", crate::machine::number(joint))
+    }
+
+    fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
+        let (_, struts) = self.reach(pose)?;
+        Ok(Self::lengths(&struts))
+    }
+
+    /// Newton. Assumes the seed lies in the assembly wanted; guarantees residuals below 1e-10 mm (plus rounding of the lengths)
+    /// and the seed's sign of det J.
+    fn forward(&self, joints: &Joints, seed: &Pose) -> Result<Pose, ForwardError> {
+        let mut size = 0.0_f64;
+        for joint in joints.iter().take(6) {
+            if !joint.is_finite() {
+                return Err(ForwardError::NotFinite);
+            }
+            size = size.max(fabs(*joint));
+        }
+        if size > 1e7 {
+            return Err(ForwardError::NoAssembly);
+        }
+        let mut pose = if *seed == Pose::ZERO || !seed.is_finite() {
+            Pose { z: self.start_z, ..Pose::ZERO }
+        } else {
+            *seed
+        };
+        let tolerance = 1e-10 + 1e-14 * size;
+        let mut side = 0.0;
+        let mut residual_mm = f64::MAX;
+        for iterations in 0..32 {
+            let at = Attitude::of(&pose);
+            let struts = self.struts(&pose, &at).map_err(|_| ForwardError::Singular { measure: 0.0 })?;
+            let mut right = [0.0; 6];
+            residual_mm = 0.0;
+            for ((r, joint), strut) in right.iter_mut().zip(joints).zip(&struts) {
+                *r = joint - strut.length;
+                residual_mm = residual_mm.max(fabs(*r));
+            }
+            let Some(solved) = solve(&self.scaled_rows(&struts), &right) else {
+                return Err(ForwardError::Singular { measure: 0.0 });
+            };
+            if iterations == 0 {
+                side = solved.determinant;
+            }
+            if residual_mm < tolerance {
+                if side * solved.determinant < 0.0 {
+                    return Err(ForwardError::NoAssembly);
+                }
+                let wrap = |angle: f64| angle - TAU * floor((angle + PI) / TAU);
+                let turned = |found: f64, wanted: f64| wanted + wrap(found - wanted);
+                // Angles stay on the seed's turn.
+                let [a, b, c] = [turned(pose.a, seed.a), turned(pose.b, seed.b), turned(pose.c, seed.c)];
+                return Ok(Pose { x: pose.x, y: pose.y, z: pose.z, a, b, c, ..Pose::ZERO });
+            }
+            let [dx, dy, dz, ox, oy, oz] = solved.x;
+            // ω → (Ȧ, Ḃ, Ċ): the inverse of E, regular where cos B ≠ 0.
+            let ((st, ct), (sp, cp)) = (at.theta, at.phi);
+            if !(fabs(ct) > 1e-9) {
+                return Err(ForwardError::Singular { measure: fabs(ct) });
+            }
+            let omega = scale(1.0 / self.radius, [ox, oy, oz]);
+            let da = (cp * omega[0] + sp * omega[1]) / ct;
+            let db = cp * omega[1] - sp * omega[0];
+            let dc = omega[2] + st * da;
+            let far = sqrt(dx * dx + dy * dy + dz * dz) / (0.5 * size);
+            let wide = fabs(da).max(fabs(db)).max(fabs(dc)) / 0.5;
+            let shrink = 1.0 / far.max(wide).max(1.0);
+            pose.x += shrink * dx;
+            pose.y += shrink * dy;
+            pose.z += shrink * dz;
+            pose.a += shrink * da;
+            pose.b += shrink * db;
+            pose.c += shrink * dc;
+            if !pose.is_finite() {
+                break;
+            }
+        }
+        Err(ForwardError::NotConverged { iterations: 32, residual_mm })
+    }
+
+    fn jacobian(&self, pose: &Pose) -> Result<Jacobian, InverseError> {
+        let (at, struts) = self.reach(pose)?;
+        let axes = at.axes();
+        let mut jacobian = [[0.0; 9]; MAX_JOINTS];
+        for (row, strut) in jacobian.iter_mut().zip(&struts) {
+            let moment = cross(strut.arm, strut.unit);
+            let [ux, uy, uz] = strut.unit;
+            let [a, b, c] = [dot(moment, axes[0]), dot(moment, axes[1]), dot(moment, axes[2])];
+            *row = [ux, uy, uz, a, b, c, 0.0, 0.0, 0.0];
+        }
+        Ok(jacobian)
+    }
+
+    /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈.
+    fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
+        let (at, struts) = self.reach(pose)?;
+        let (v, a) = (velocity, acceleration);
+        if !(v.is_finite() && a.is_finite()) {
+            return Err(InverseError::NotFinite);
+        }
+        let (omega, alpha) = at.spin(v, a);
+        let mut motion = JointMotion { position: Self::lengths(&struts), ..JointMotion::default() };
+        let each = struts.iter().zip(motion.velocity.iter_mut()).zip(motion.acceleration.iter_mut());
+        for ((strut, rate), second) in each {
+            let turn = cross(omega, strut.arm);
+            let d_v = add([v.x, v.y, v.z], turn);
+            let d_a = add([a.x, a.y, a.z], add(cross(alpha, strut.arm), cross(omega, turn)));
+            *rate = dot(strut.unit, d_v);
+            *second = dot(strut.unit, d_a) + (dot(d_v, d_v) - *rate * *rate) / strut.length;
+        }
+        Ok(motion)
+    }
+
+    fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
+        let (_, struts) = self.reach(pose)?;
+        let forward = reciprocal_condition(&self.scaled_rows(&struts));
+        Ok(Singularity { inverse: 1.0, inverse_joint: 0, forward })
+    }
+}

@@ -1,0 +1,882 @@
+//! Lambda: a platform on three long chains, each braced by a short one; six sliders on three vertical shafts, six
+//! degrees of freedom.
+//!
+//! Source: [L6] Nešovanović and Živanović, "Workspace and kinematic structure analysis of a 6-DOF Lambda parallel kinematic
+//! machine", IJEEC 6(1), 2022, doi 10.7251/IJEEC2206001N.
+//! Frame: base, origin in the middle of the shaft circle in the plane where all sliders are 0, Z up (z of the platform is
+//! negative), mm and rad. Machine axes X Y Z A B C = x y z ψ θ φ, R = Rz(φ) Ry(θ) Rx(ψ). Joints l1..l6, **downwards**;
+//! l1..l3 the upper sliders (long chains), l4..l6 the lower ones (short chains) of the same legs.
+//!
+//! | here              | [L6]   | meaning                                                        |
+//! |-------------------|--------|----------------------------------------------------------------|
+//! | `base_radius_mm`  | C      | radius of the shaft circle                                     |
+//! | `platform_radius_mm` | D   | radius (not a side) of the circle of the platform joints       |
+//! | `c_mm`, `r_mm`, `u_mm` | c, r, u | long chain, its part from J to N, short chain             |
+//! | e, k              | –      | c − r; e/c                                                     |
+//! | `yaw_offset_deg`  | –      | δ: turns the platform joints against the shafts; 0 in [L6]     |
+//! | ρ, h, g           | –      | distance of N from its shaft; drops of long and short chain    |
+//! | σ                 | –      | measure of the direct singularity; its sign is the assembly    |
+//!
+//! Inverse: [L6] P(6)–P(11), closed form, evaluated with ρ² (the printed form subtracts numbers of order z²).
+//!   l_i = −N_z − h, l_{i+3} = l_i + k h + g. Working mode of the paper, the only one: slider above N, lower slider below J.
+//! Forward: each leg's triangle gives ρ and the height of N; z, ψ, θ follow in closed form; x, y, φ by Newton on the planar
+//!   three-circle problem: quadratic, at most 16 solves of 3×3 (2 with a warm start a servo period old). If it fails or ends
+//!   in the other assembly: all real solutions (at most six) from a trigonometric polynomial of degree 3, bounded.
+//! Singular: chain horizontal (h or g = 0, inverse); N on its shaft, or the three vertical planes through shaft and N
+//!   with a common line (σ = 0, forward). [L6] does not mention that with δ = 0 every pose with zero angles has σ = 0.
+//! Accuracy: forward(inverse(p)) within 1e-6 mm, 1e-9 rad where |σ| ≥ 0.1 (typically 1e-10 mm).
+//! Not modelled: collisions, joint cones at the sliders. All default dimensions are **inferred**, the paper prints none.
+
+use crate::attitude::{Attitude, yawed};
+use crate::errors::{self, ForwardError, GeometryError, InverseError, Key};
+use crate::kinematics::{
+    Branches, Jacobian, JointKind, JointLimit, JointMotion, Joints, Kinematics, LimitCode, MAX_JOINTS, Side,
+    Singularity,
+};
+use crate::maths::{PI, TAU, acos, atan2, cos, cos_sin_deg, fabs, radians, sin, sincos, sqrt};
+use crate::pose::{Axis, AxisSet, Pose};
+use crate::vector::{Vec3, add, cross, dot, is_finite, scale};
+
+/// Lambda as written in a machine file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize), serde(deny_unknown_fields))]
+pub struct Lambda6Parameters {
+    /// C, mm.
+    pub base_radius_mm: f64,
+    /// D, mm.
+    pub platform_radius_mm: f64,
+    /// cᵢ: long chains, mm.
+    pub c_mm: [f64; 3],
+    /// rᵢ: from the rotary joint to the platform joint, mm.
+    pub r_mm: [f64; 3],
+    /// uᵢ: short chains, mm.
+    pub u_mm: [f64; 3],
+    /// δ, degrees.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub yaw_offset_deg: f64,
+    /// Assembly: the sign of σ, ±1.
+    #[cfg_attr(feature = "serde", serde(default = "plus"))]
+    pub assembly: i8,
+    /// Smallest and largest distance of the two sliders of a shaft, mm; absent: no limit.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub spacing_mm: Option<[f64; 2]>,
+    /// Largest angle between a long chain and the platform's normal, degrees; absent: no limit.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub platform_cone_deg: Option<f64>,
+    /// Forward answers `Singular` where |σ| is smaller.
+    #[cfg_attr(feature = "serde", serde(default = "default_sigma_min"))]
+    pub sigma_min: f64,
+}
+
+#[cfg(feature = "serde")]
+fn plus() -> i8 {
+    1
+}
+
+#[cfg(feature = "serde")]
+fn default_sigma_min() -> f64 {
+    0.05
+}
+
+/// Sets of dimensions: all **inferred**, consistent with Table I of [L6], not published.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lambda6Set {
+    /// The paper's literal layout; singular at yaw 0.
+    Paper,
+    /// The default machine: platform joints turned 45° against the shafts.
+    Yaw45,
+    /// All legs different (for tests).
+    Asym45,
+    /// A second family of dimensions, u > e.
+    Alt45,
+    /// Up to six assemblies (for tests).
+    Wide,
+}
+
+impl Lambda6Set {
+    /// All five.
+    pub const ALL: [Self; 5] = [Self::Paper, Self::Yaw45, Self::Asym45, Self::Alt45, Self::Wide];
+}
+
+impl From<Lambda6Set> for Lambda6Parameters {
+    fn from(set: Lambda6Set) -> Self {
+        let yaw45 = Self {
+            base_radius_mm: 1000.0,
+            platform_radius_mm: 300.0,
+            c_mm: [1400.0; 3],
+            r_mm: [500.0; 3],
+            u_mm: [800.0; 3],
+            yaw_offset_deg: 45.0,
+            assembly: 1,
+            spacing_mm: Some([800.0, 1600.0]),
+            platform_cone_deg: None,
+            sigma_min: 0.05,
+        };
+        match set {
+            Lambda6Set::Paper => Self { yaw_offset_deg: 0.0, ..yaw45 },
+            Lambda6Set::Yaw45 => yaw45,
+            Lambda6Set::Asym45 => Self {
+                c_mm: [1400.0, 1380.0, 1420.0],
+                r_mm: [500.0, 490.0, 520.0],
+                u_mm: [800.0, 810.0, 790.0],
+                ..yaw45
+            },
+            Lambda6Set::Alt45 => Self {
+                base_radius_mm: 900.0,
+                c_mm: [1100.0; 3],
+                r_mm: [300.0; 3],
+                u_mm: [900.0; 3],
+                spacing_mm: Some([600.0, 1620.0]),
+                ..yaw45
+            },
+            Lambda6Set::Wide => Self {
+                base_radius_mm: 700.0,
+                platform_radius_mm: 500.0,
+                c_mm: [1500.0; 3],
+                r_mm: [600.0; 3],
+                u_mm: [850.0; 3],
+                yaw_offset_deg: 0.0,
+                spacing_mm: None,
+                sigma_min: 0.0,
+                ..yaw45
+            },
+        }
+    }
+}
+
+/// One leg, ready to run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Leg {
+    /// Shaft in the base plane.
+    shaft: [f64; 2],
+    /// Platform joint in the platform frame.
+    joint: [f64; 2],
+    c: f64,
+    u: f64,
+    /// e
+    elbow: f64,
+    /// k = e/c
+    k: f64,
+    /// Largest allowed ρ² (exclusive): the shorter of both chains decides.
+    reach2: f64,
+}
+
+/// A valid Lambda machine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lambda6 {
+    legs: [Leg; 3],
+    platform_radius: f64,
+    base_radius: f64,
+    yaw_offset: f64,
+    assembly: f64,
+    spacing: [f64; 2],
+    cone_cos: f64,
+    cone_rad: f64,
+    sigma_min: f64,
+}
+
+/// One solved leg of the inverse.
+#[derive(Debug, Clone, Copy, Default)]
+struct LegState {
+    /// N − p in the base frame.
+    arm: Vec3,
+    /// Shaft → N, horizontal.
+    w: [f64; 2],
+    rho2: f64,
+    h: f64,
+    g: f64,
+    upper: f64,
+    lower: f64,
+}
+
+/// Determinant of three rows.
+#[inline]
+fn determinant(a: Vec3, b: Vec3, c: Vec3) -> f64 {
+    dot(a, cross(b, c))
+}
+
+fn wrap(angle: f64) -> f64 {
+    // To (−π, π]; the angles here are at most a few turns, so the loop is bounded.
+    let mut angle = angle;
+    for _ in 0..16 {
+        if angle > PI {
+            angle -= TAU;
+        } else if angle <= -PI {
+            angle += TAU;
+        }
+    }
+    angle
+}
+
+/// What the joints fix in closed form: ρᵢ, and the tilted platform joints.
+struct Circles {
+    rho: [f64; 3],
+    /// qᵢ, tilted but not yet yawed.
+    arms: [Vec3; 3],
+    z: f64,
+    psi: f64,
+    theta: f64,
+}
+
+/// The unknowns of the three-circle problem.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Planar3 {
+    x: f64,
+    y: f64,
+    phi: f64,
+}
+
+impl Lambda6 {
+    /// A machine from its parameters.
+    ///
+    /// # Errors
+    /// Each names its parameter: `NotFinite`, `NotPositive`, `OutOfRange`, `NotASign`; `NotLess` for D ≥ C, r ≥ c, spacing_min ≥
+    /// spacing_max, spacing_max ≥ e + u, or spacing_min ≤ √|e² − u²| (the sliders could leave the working mode).
+    pub fn new(p: &Lambda6Parameters) -> Result<Self, GeometryError> {
+        let base_radius = errors::length(Key::of("base_radius_mm"), p.base_radius_mm)?;
+        let platform_radius = errors::length(Key::of("platform_radius_mm"), p.platform_radius_mm)?;
+        if platform_radius >= base_radius {
+            return Err(GeometryError::NotLess {
+                key: Key::of("platform_radius_mm"),
+                value: platform_radius,
+                than: Key::of("base_radius_mm"),
+                limit: base_radius,
+            });
+        }
+        let yaw_offset_deg = errors::angle_deg(Key::of("yaw_offset_deg"), p.yaw_offset_deg)?;
+        let assembly = errors::sign(Key::of("assembly"), p.assembly)?;
+        let key = Key::of("sigma_min");
+        if !p.sigma_min.is_finite() {
+            return Err(GeometryError::NotFinite { key });
+        }
+        if !(0.0..=2.0).contains(&p.sigma_min) {
+            return Err(GeometryError::OutOfRange { key, value: p.sigma_min, low: 0.0, high: 2.0 });
+        }
+
+        let leg = |i: usize, azimuth: f64, c: f64, r: f64, u: f64| -> Result<Leg, GeometryError> {
+            let c = errors::length(Key::at("c_mm", i), c)?;
+            let r = errors::length(Key::at("r_mm", i), r)?;
+            let u = errors::length(Key::at("u_mm", i), u)?;
+            if r >= c {
+                let (key, than) = (Key::at("r_mm", i), Key::at("c_mm", i));
+                return Err(GeometryError::NotLess { key, value: r, than, limit: c });
+            }
+            let elbow = c - r;
+            let k = elbow / c;
+            let (cb, sb) = cos_sin_deg(azimuth);
+            let (cj, sj) = cos_sin_deg(azimuth + yaw_offset_deg);
+            let reach = c.min(u / k);
+            Ok(Leg {
+                shaft: [base_radius * cb, base_radius * sb],
+                joint: [platform_radius * cj, platform_radius * sj],
+                c,
+                u,
+                elbow,
+                k,
+                reach2: reach * reach,
+            })
+        };
+        // Note the order of the azimuths: 0°, 240°, 120°.
+        let [c1, c2, c3] = p.c_mm;
+        let [r1, r2, r3] = p.r_mm;
+        let [u1, u2, u3] = p.u_mm;
+        let legs = [leg(0, 0.0, c1, r1, u1)?, leg(1, 240.0, c2, r2, u2)?, leg(2, 120.0, c3, r3, u3)?];
+
+        let mut spacing = [f64::NEG_INFINITY, f64::INFINITY];
+        if let Some([low, high]) = p.spacing_mm {
+            let (low_key, high_key) = (Key::at("spacing_mm", 0), Key::at("spacing_mm", 1));
+            let low = errors::coordinate(low_key, low)?;
+            let high = errors::coordinate(high_key, high)?;
+            if low < 0.0 {
+                return Err(GeometryError::OutOfRange { key: low_key, value: low, low: 0.0, high });
+            }
+            if low >= high {
+                return Err(GeometryError::NotLess { key: low_key, value: low, than: high_key, limit: high });
+            }
+            for (i, leg) in legs.iter().enumerate() {
+                let most = leg.elbow + leg.u;
+                if high >= most {
+                    let than = Key::at("u_mm", i);
+                    return Err(GeometryError::NotLess { key: high_key, value: high, than, limit: most });
+                }
+                let least = sqrt(fabs(leg.elbow * leg.elbow - leg.u * leg.u));
+                if low <= least {
+                    return Err(GeometryError::OutOfRange { key: low_key, value: low, low: least, high });
+                }
+            }
+            spacing = [low, high];
+        }
+        let mut cone_rad = PI;
+        if let Some(value) = p.platform_cone_deg {
+            let key = Key::of("platform_cone_deg");
+            if !(value > 0.0 && value <= 180.0) {
+                return Err(GeometryError::OutOfRange { key, value, low: 0.0, high: 180.0 });
+            }
+            cone_rad = radians(value);
+        }
+        Ok(Self {
+            legs,
+            platform_radius,
+            base_radius,
+            yaw_offset: radians(yaw_offset_deg),
+            assembly,
+            spacing,
+            cone_cos: if p.platform_cone_deg.is_some() { cos(cone_rad) } else { -2.0 },
+            cone_rad,
+            sigma_min: p.sigma_min,
+        })
+    }
+
+    /// The same machine without limits of spacing and cone: geometry alone.
+    pub fn without_limits(mut self) -> Self {
+        self.spacing = [f64::NEG_INFINITY, f64::INFINITY];
+        self.cone_cos = -2.0;
+        self
+    }
+
+    /// Radius of the platform joints, mm: what makes angular columns of the Jacobian comparable with the linear ones.
+    pub fn platform_radius_mm(&self) -> f64 {
+        self.platform_radius
+    }
+
+    #[inline]
+    fn solve(&self, pose: &Pose, at: &Attitude) -> Result<[LegState; 3], InverseError> {
+        let mut solved = [LegState::default(); 3];
+        for ((state, leg), number) in solved.iter_mut().zip(&self.legs).zip(0u8..) {
+            let arm = yawed(at.phi, at.tilted(leg.joint));
+            let w = [pose.x + arm[0] - leg.shaft[0], pose.y + arm[1] - leg.shaft[1]];
+            let rho2 = w[0] * w[0] + w[1] * w[1];
+            if !(rho2 > 1e-12 && rho2 < leg.reach2) {
+                return Err(Self::leg_error(pose, leg, number, rho2));
+            }
+            let h = sqrt(leg.c * leg.c - rho2);
+            let g = sqrt(leg.u * leg.u - leg.k * leg.k * rho2);
+            let upper = -(pose.z + arm[2]) - h;
+            *state = LegState { arm, w, rho2, h, g, upper, lower: upper + leg.k * h + g };
+        }
+        Ok(solved)
+    }
+
+    #[cold]
+    fn leg_error(pose: &Pose, leg: &Leg, number: u8, rho2: f64) -> InverseError {
+        let rho_mm = sqrt(rho2).min(f64::MAX);
+        if !pose.is_finite() {
+            InverseError::NotFinite
+        } else if rho2 <= 1e-12 {
+            InverseError::OnShaft { leg: number }
+        } else if !(rho_mm < leg.c) {
+            InverseError::LongChainReach { leg: number, rho_mm, limit_mm: leg.c }
+        } else {
+            InverseError::ShortChainReach { leg: number, rho_mm: leg.k * rho_mm, limit_mm: leg.u }
+        }
+    }
+
+    #[inline]
+    fn check(&self, legs: &[LegState; 3], at: &Attitude) -> Result<(), InverseError> {
+        for (leg, number) in legs.iter().zip(0u8..) {
+            let value_mm = leg.lower - leg.upper;
+            let [low, high] = self.spacing;
+            if !(value_mm >= low - 1e-9) {
+                return Err(InverseError::Spacing { leg: number, side: Side::Low, value_mm, limit_mm: low });
+            }
+            if !(value_mm <= high + 1e-9) {
+                return Err(InverseError::Spacing {
+                    leg: number,
+                    side: Side::High,
+                    value_mm,
+                    limit_mm: high,
+                });
+            }
+        }
+        if self.cone_cos > -1.5 {
+            return self.check_cone(legs, at);
+        }
+        Ok(())
+    }
+
+    /// Angle between N → S and the platform's normal +Z_P.
+    fn check_cone(&self, legs: &[LegState; 3], at: &Attitude) -> Result<(), InverseError> {
+        let ((ss, cs), (st, ct), (sp, cp)) = (at.psi, at.theta, at.phi);
+        let normal = [cp * st * cs + sp * ss, sp * st * cs - cp * ss, ct * cs];
+        for ((state, leg), number) in legs.iter().zip(&self.legs).zip(0u8..) {
+            let cosine = dot([-state.w[0], -state.w[1], state.h], normal) / leg.c;
+            if cosine < self.cone_cos - 1e-12 {
+                let angle_rad = acos(cosine.clamp(-1.0, 1.0));
+                return Err(InverseError::PlatformCone { leg: number, angle_rad, limit_rad: self.cone_rad });
+            }
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn reach(&self, pose: &Pose) -> Result<(Attitude, [LegState; 3]), InverseError> {
+        let at = Attitude::of(pose);
+        let legs = self.solve(pose, &at)?;
+        // A NaN in z or in the angles ends in the spacing check or here.
+        if !(legs[0].upper + legs[1].upper + legs[2].upper).is_finite() {
+            return Err(InverseError::NotFinite);
+        }
+        self.check(&legs, &at)?;
+        Ok((at, legs))
+    }
+
+    /// σ of a pose, from the horizontal vectors of its legs.
+    fn sigma_of(&self, legs: &[LegState; 3]) -> f64 {
+        let row = |leg: &LegState| {
+            let [wx, wy] = leg.w;
+            let rho = sqrt(leg.rho2);
+            [wx / rho, wy / rho, (leg.arm[0] * wy - leg.arm[1] * wx) / (rho * self.platform_radius)]
+        };
+        let [a, b, c] = legs;
+        determinant(row(a), row(c), row(b))
+    }
+
+    /// σ: dimensionless, |σ| at most about 2.6; 0 at a direct singularity, its sign is the assembly. Limits do not matter.
+    ///
+    /// # Errors
+    /// Those of the inverse that are geometry.
+    pub fn sigma(&self, pose: &Pose) -> Result<f64, InverseError> {
+        if !pose.is_finite() {
+            return Err(InverseError::NotFinite);
+        }
+        Ok(self.sigma_of(&self.solve(pose, &Attitude::of(pose))?))
+    }
+
+    /// The rows of ∂l/∂(v, ω) (twist form): f and arm × f for each joint.
+    fn twist_rows(&self, legs: &[LegState; 3]) -> Result<[[f64; 6]; 6], InverseError> {
+        let mut rows = [[0.0; 6]; 6];
+        let (upper, lower) = rows.split_at_mut(3);
+        for (((state, leg), up), low) in legs.iter().zip(&self.legs).zip(upper).zip(lower) {
+            self.guard(state, leg)?;
+            let [wx, wy] = state.w;
+            let stiff = leg.k / state.h + leg.k * leg.k / state.g;
+            let f = [wx / state.h, wy / state.h, -1.0];
+            let f_low = [f[0] - stiff * wx, f[1] - stiff * wy, -1.0];
+            for (row, f) in [(up, f), (low, f_low)] {
+                let moment = cross(state.arm, f);
+                *row = [f[0], f[1], f[2], moment[0], moment[1], moment[2]];
+            }
+        }
+        Ok(rows)
+    }
+
+    #[inline]
+    fn guard(&self, state: &LegState, leg: &Leg) -> Result<(), InverseError> {
+        let measure = (state.h / leg.c).min(state.g / leg.u);
+        if measure >= 1e-9 { Ok(()) } else { Err(InverseError::Singular { measure }) }
+    }
+
+    /// ∂l/∂(v, ω): rows l1..l6, columns v and ω in base axes; mm/mm and mm/rad.
+    ///
+    /// # Errors
+    /// As [`Kinematics::jacobian`].
+    pub fn twist_jacobian(&self, pose: &Pose) -> Result<[[f64; 6]; 6], InverseError> {
+        let (_, legs) = self.reach(pose)?;
+        self.twist_rows(&legs)
+    }
+
+    /// The legs' triangles, then height and tilt: all that is known in closed form.
+    fn circles(&self, l: &Joints) -> Result<Circles, ForwardError> {
+        let mut rho = [0.0; 3];
+        let mut heights = [0.0; 3];
+        let uppers = [l[0], l[1], l[2]];
+        let lowers = [l[3], l[4], l[5]];
+        if !(is_finite(uppers) && is_finite(lowers)) {
+            return Err(ForwardError::NotFinite);
+        }
+        let each = self.legs.iter().zip(uppers).zip(lowers).zip(rho.iter_mut()).zip(heights.iter_mut());
+        for (((((leg, upper), lower), rho), height), number) in each.zip(0u8..) {
+            let (e, u) = (leg.elbow, leg.u);
+            let d = lower - upper;
+            if !(d > fabs(e - u) && d < e + u) {
+                return Err(ForwardError::LegTriangle {
+                    leg: number,
+                    spacing_mm: d,
+                    low_mm: fabs(e - u),
+                    high_mm: e + u,
+                });
+            }
+            let t = (d * d + (e - u) * (e + u)) / (2.0 * d);
+            if !(t > 0.0 && t < d) {
+                return Err(ForwardError::WrongWorkingMode { mechanism: None, chain: number });
+            }
+            // 16 × squared area, as a product: accurate near the stretched position.
+            let area = (e + u + d) * (e + u - d) * (d + e - u) * (d - e + u);
+            *rho = sqrt(area) / (2.0 * d * leg.k);
+            *height = -(upper + t / leg.k);
+        }
+        // Equilateral platform: Σ bᵢ = 0, Σ bᵢ bᵢᵀ = (3/2) D² 1.
+        let d2 = 2.0 / (3.0 * self.platform_radius * self.platform_radius);
+        let (mut r31, mut r32) = (0.0, 0.0);
+        for (leg, z) in self.legs.iter().zip(heights) {
+            r31 += d2 * z * leg.joint[0];
+            r32 += d2 * z * leg.joint[1];
+        }
+        let square = 1.0 - r31 * r31 - r32 * r32;
+        if !(square > 0.0) {
+            return Err(ForwardError::TiltOutOfRange);
+        }
+        let r33 = sqrt(square);
+        let level = sqrt(r32 * r32 + r33 * r33);
+        // sin θ = −r31, cos θ = level, sin ψ = r32/level, cos ψ = r33/level: no need of the angles themselves yet.
+        let at = Attitude { psi: (r32 / level, r33 / level), theta: (-r31, level), phi: (0.0, 1.0) };
+        let [a, b, c] = &self.legs;
+        Ok(Circles {
+            rho,
+            arms: [at.tilted(a.joint), at.tilted(b.joint), at.tilted(c.joint)],
+            z: (heights[0] + heights[1] + heights[2]) / 3.0,
+            psi: atan2(r32, r33),
+            theta: atan2(-r31, level),
+        })
+    }
+
+    /// Newton on the three circles. Returns the solution and σ, `None` if it did not converge.
+    ///
+    /// Source: standard Newton. Assumes all ρ > 0. Guarantee: an accepted result has |F| < 1e-10 mm. Cost: at most 16 solves
+    /// and 17 evaluations.
+    fn newton(&self, circles: &Circles, start: Planar3) -> Option<(Planar3, f64)> {
+        let mut now = start;
+        for _ in 0..17 {
+            let yaw = sincos(now.phi);
+            let mut residuals = [0.0; 3];
+            let mut rows = [[0.0; 3]; 3];
+            let each = self.legs.iter().zip(circles.arms).zip(circles.rho);
+            for (((leg, arm), rho), (residual, row)) in each.zip(residuals.iter_mut().zip(rows.iter_mut())) {
+                let m = yawed(yaw, arm);
+                let w = [m[0] + now.x - leg.shaft[0], m[1] + now.y - leg.shaft[1]];
+                let inverse = 1.0 / rho;
+                *residual = 0.5 * (w[0] * w[0] + w[1] * w[1] - rho * rho) * inverse;
+                *row = [w[0] * inverse, w[1] * inverse, (m[0] * w[1] - m[1] * w[0]) * inverse];
+            }
+            let [a, b, c] = rows;
+            let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
+            let det = dot(a, bc);
+            let worst = fabs(residuals[0]).max(fabs(residuals[1])).max(fabs(residuals[2]));
+            if worst < 1e-10 {
+                // Rows in the order 1, 3, 2.
+                return Some((now, -det / self.platform_radius));
+            }
+            if !(fabs(det) > 1e-9) {
+                return None;
+            }
+            // Inverse of a matrix with rows a, b, c: columns b×c, c×a, a×b over the determinant.
+            let step = scale(
+                -1.0 / det,
+                add(add(scale(residuals[0], bc), scale(residuals[1], ca)), scale(residuals[2], ab)),
+            );
+            let longest = sqrt(step[0] * step[0] + step[1] * step[1]) / (self.base_radius / 4.0);
+            let widest = fabs(step[2]) / 0.5;
+            let shrink = longest.max(widest).max(1.0);
+            now = Planar3 {
+                x: now.x + step[0] / shrink,
+                y: now.y + step[1] / shrink,
+                phi: now.phi + step[2] / shrink,
+            };
+            if !(now.x.is_finite() && now.y.is_finite() && now.phi.is_finite()) {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// P, det and F of the eliminated problem at one yaw: (x, y) = P/det, F = |P + det m₁|² − det² ρ₁².
+    fn eliminated(&self, circles: &Circles, phi: f64) -> ([f64; 2], f64, f64) {
+        let yaw = sincos(phi);
+        let [l1, l2, l3] = &self.legs;
+        let [q1, q2, q3] = circles.arms;
+        let [rho1, rho2, rho3] = circles.rho;
+        let centre = |leg: &Leg, q: Vec3| {
+            let m = yawed(yaw, q);
+            [m[0] - leg.shaft[0], m[1] - leg.shaft[1]]
+        };
+        let (m1, m2, m3) = (centre(l1, q1), centre(l2, q2), centre(l3, q3));
+        let a = [m2[0] - m1[0], m2[1] - m1[1]];
+        let b = [m3[0] - m1[0], m3[1] - m1[1]];
+        let square = |m: [f64; 2]| m[0] * m[0] + m[1] * m[1];
+        let s = 0.5 * (rho2 * rho2 - rho1 * rho1 - square(m2) + square(m1));
+        let t = 0.5 * (rho3 * rho3 - rho1 * rho1 - square(m3) + square(m1));
+        let det = a[0] * b[1] - a[1] * b[0];
+        let p = [s * b[1] - t * a[1], a[0] * t - b[0] * s];
+        let n = [p[0] + det * m1[0], p[1] + det * m1[1]];
+        (p, det, n[0] * n[0] + n[1] * n[1] - det * det * rho1 * rho1)
+    }
+
+    /// Every real solution of the three-circle problem for the upright platform with its σ: at most six.
+    ///
+    /// F(φ) is a trigonometric polynomial of degree 3: seven samples give its coefficients; 72 cells are searched for sign
+    /// changes of F and, for pairs of roots within a cell, of F'. Cost: at most 72 × 3 bisections of 60 steps; always ends.
+    fn all_solutions(&self, circles: &Circles) -> Branches<(Planar3, f64)> {
+        let mut all = Branches::new();
+        let mut series = Series { mean: 0.0, harmonics: [[0.0; 2]; 3] };
+        let mut sample = 0.0;
+        for _ in 0..7 {
+            let phi = TAU * sample / 7.0;
+            let (_, _, f) = self.eliminated(circles, phi);
+            series.mean += f / 7.0;
+            let mut order = 1.0;
+            for harmonic in &mut series.harmonics {
+                harmonic[0] += f * cos(order * phi) * (2.0 / 7.0);
+                harmonic[1] += f * sin(order * phi) * (2.0 / 7.0);
+                order += 1.0;
+            }
+            sample += 1.0;
+        }
+        let mut keep = |phi: f64| {
+            let (p, det, _) = self.eliminated(circles, phi);
+            let (x, y) = (p[0] / det, p[1] / det);
+            if !(x.is_finite() && y.is_finite()) {
+                return;
+            }
+            if let Some((mut found, sigma)) = self.newton(circles, Planar3 { x, y, phi }) {
+                found.phi = wrap(found.phi);
+                let known = |(other, _): &(Planar3, f64)| {
+                    fabs(wrap(other.phi - found.phi)) < 1e-7 && fabs(other.x - found.x) < 1e-4
+                };
+                if !all.as_slice().iter().any(known) {
+                    all.push((found, sigma));
+                }
+            }
+        };
+        const CELL: f64 = TAU / 72.0;
+        let mut low = -PI;
+        let mut at_low = series.value(low);
+        for _ in 0..72 {
+            let high = low + CELL;
+            let at_high = series.value(high);
+            if at_low[0] * at_high[0] <= 0.0 {
+                keep(bisect(low, high, |phi| series.value(phi)[0]));
+            } else if at_low[1] * at_high[1] < 0.0 {
+                let extremum = bisect(low, high, |phi| series.value(phi)[1]);
+                if series.value(extremum)[0] * at_low[0] <= 0.0 {
+                    keep(bisect(low, extremum, |phi| series.value(phi)[0]));
+                    keep(bisect(extremum, high, |phi| series.value(phi)[0]));
+                }
+            }
+            (low, at_low) = (high, at_high);
+        }
+        all
+    }
+
+    fn pose_of(circles: &Circles, at: Planar3) -> Pose {
+        Pose {
+            x: at.x,
+            y: at.y,
+            z: circles.z,
+            a: circles.psi,
+            b: circles.theta,
+            c: wrap(at.phi),
+            ..Pose::ZERO
+        }
+    }
+
+    /// Every real upright pose of these joints with its σ, whatever the assembly: at most six.
+    ///
+    /// # Errors
+    /// Those of the legs' triangles and the tilt; `NoAssembly` if no pose is real.
+    pub fn forward_all(&self, joints: &Joints) -> Result<Branches<(Pose, f64)>, ForwardError> {
+        let circles = self.circles(joints)?;
+        let mut all = Branches::new();
+        for &(found, sigma) in self.all_solutions(&circles).as_slice() {
+            all.push((Self::pose_of(&circles, found), sigma));
+        }
+        if all.as_slice().is_empty() { Err(ForwardError::NoAssembly) } else { Ok(all) }
+    }
+}
+
+impl TryFrom<Lambda6Parameters> for Lambda6 {
+    type Error = GeometryError;
+    fn try_from(parameters: Lambda6Parameters) -> Result<Self, GeometryError> {
+        Self::new(&parameters)
+    }
+}
+
+/// A trigonometric polynomial of degree 3.
+struct Series {
+    mean: f64,
+    harmonics: [[f64; 2]; 3],
+}
+
+impl Series {
+    /// F and F'.
+    fn value(&self, phi: f64) -> [f64; 2] {
+        let (mut f, mut slope, mut order) = (self.mean, 0.0, 1.0);
+        for [a, b] in self.harmonics {
+            let (s, c) = sincos(order * phi);
+            f += a * c + b * s;
+            slope += order * (b * c - a * s);
+            order += 1.0;
+        }
+        [f, slope]
+    }
+}
+
+/// Root of a function that changes sign between the ends: 60 halvings.
+fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let sign = f(low);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if f(middle) * sign > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+fn pack(legs: &[LegState; 3]) -> Joints {
+    let [a, b, c] = legs;
+    let mut joints = [0.0; MAX_JOINTS];
+    [joints[0], joints[1], joints[2]] = [a.upper, b.upper, c.upper];
+    [joints[3], joints[4], joints[5]] = [a.lower, b.lower, c.lower];
+    joints
+}
+
+impl Kinematics for Lambda6 {
+    fn joint_count(&self) -> usize {
+        6
+    }
+
+    fn axes(&self) -> AxisSet {
+        AxisSet::new(&[Axis::X, Axis::Y, Axis::Z, Axis::A, Axis::B, Axis::C])
+    }
+
+    fn joint_kind(&self, _: usize) -> JointKind {
+        JointKind::Linear
+    }
+
+    fn joint_code(&self, joint: usize) -> (&'static str, &'static str) {
+        ("", crate::machine::number(joint))
+    }
+
+    fn limit_code(&self, limit: &JointLimit) -> LimitCode {
+        let word = match limit.side {
+            Side::Low => "slider_min",
+            Side::High => "slider_max",
+        };
+        LimitCode::new("", word, crate::machine::number(limit.joint))
+    }
+
+    fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
+        let (_, legs) = self.reach(pose)?;
+        Ok(pack(&legs))
+    }
+
+    /// Warm start from the seed's x, y, φ, in the seed's assembly, if |σ(seed)| ≥ `sigma_min`. A seed of all zeros means none:
+    /// then from x = y = 0, φ = ±45° − δ in the configured assembly.
+    fn forward(&self, joints: &Joints, seed: &Pose) -> Result<Pose, ForwardError> {
+        let circles = self.circles(joints)?;
+        let mut assembly = self.assembly;
+        let mut start = Planar3 { x: 0.0, y: 0.0, phi: assembly * (PI / 4.0) - self.yaw_offset };
+        if *seed != Pose::ZERO && seed.is_finite() {
+            // The seed's tilt is near the one just found; σ depends on x, y, φ and the horizontal arms.
+            let yaw = sincos(seed.c);
+            let mut legs = [LegState::default(); 3];
+            for ((state, leg), arm) in legs.iter_mut().zip(&self.legs).zip(circles.arms) {
+                state.arm = yawed(yaw, arm);
+                state.w = [seed.x + state.arm[0] - leg.shaft[0], seed.y + state.arm[1] - leg.shaft[1]];
+                state.rho2 = state.w[0] * state.w[0] + state.w[1] * state.w[1];
+            }
+            let sigma = self.sigma_of(&legs);
+            if fabs(sigma) >= self.sigma_min.max(1e-12) {
+                assembly = if sigma > 0.0 { 1.0 } else { -1.0 };
+                start = Planar3 { x: seed.x, y: seed.y, phi: seed.c };
+            }
+        }
+        if let Some((found, sigma)) = self.newton(&circles, start)
+            && sigma * assembly > 0.0
+            && fabs(sigma) >= self.sigma_min
+        {
+            return Ok(Self::pose_of(&circles, found));
+        }
+        let mut best: Option<(Planar3, f64)> = None;
+        for &(found, sigma) in self.all_solutions(&circles).as_slice() {
+            let nearer = |(other, _): (Planar3, f64)| {
+                fabs(wrap(found.phi - start.phi)) < fabs(wrap(other.phi - start.phi))
+            };
+            if sigma * assembly > 0.0 && best.is_none_or(nearer) {
+                best = Some((found, sigma));
+            }
+        }
+        match best {
+            None => Err(ForwardError::NoAssembly),
+            Some((_, sigma)) if fabs(sigma) < self.sigma_min => {
+                Err(ForwardError::Singular { measure: fabs(sigma) })
+            }
+            Some((found, _)) => Ok(Self::pose_of(&circles, found)),
+        }
+    }
+
+    /// J_q = J · diag(1, E): the twist form times the axes of ψ̇, θ̇, φ̇.
+    fn jacobian(&self, pose: &Pose) -> Result<Jacobian, InverseError> {
+        let (at, legs) = self.reach(pose)?;
+        let axes = at.axes();
+        let mut jacobian = [[0.0; 9]; MAX_JOINTS];
+        for (row, [vx, vy, vz, wx, wy, wz]) in jacobian.iter_mut().zip(self.twist_rows(&legs)?) {
+            let moment = [wx, wy, wz];
+            let [a, b, c] = [dot(moment, axes[0]), dot(moment, axes[1]), dot(moment, axes[2])];
+            *row = [vx, vy, vz, a, b, c, 0.0, 0.0, 0.0];
+        }
+        Ok(jacobian)
+    }
+
+    /// N̈ = p̈ + α × arm + ω × (ω × arm); h ḣ = −w·ẇ and h ḧ + ḣ² = −(ẇ² + w·ẅ), likewise g with k².
+    fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
+        let (at, legs) = self.reach(pose)?;
+        let (v, a) = (velocity, acceleration);
+        if !(v.is_finite() && a.is_finite()) {
+            return Err(InverseError::NotFinite);
+        }
+        let (omega, alpha) = at.spin(v, a);
+        let mut rates = [LegState::default(); 3];
+        let mut accelerations = [LegState::default(); 3];
+        let each = legs.iter().zip(&self.legs).zip(rates.iter_mut()).zip(accelerations.iter_mut());
+        for (((state, leg), rate), second) in each {
+            self.guard(state, leg)?;
+            let turn = cross(omega, state.arm);
+            let n_v = add([v.x, v.y, v.z], turn);
+            let n_a = add([a.x, a.y, a.z], add(cross(alpha, state.arm), cross(omega, turn)));
+            let radial = state.w[0] * n_v[0] + state.w[1] * n_v[1];
+            let radial_2 = n_v[0] * n_v[0] + n_v[1] * n_v[1] + state.w[0] * n_a[0] + state.w[1] * n_a[1];
+            let k2 = leg.k * leg.k;
+            let h_v = -radial / state.h;
+            let h_a = -(radial_2 + h_v * h_v) / state.h;
+            let g_v = -k2 * radial / state.g;
+            let g_a = -(k2 * radial_2 + g_v * g_v) / state.g;
+            rate.upper = -n_v[2] - h_v;
+            rate.lower = rate.upper + leg.k * h_v + g_v;
+            second.upper = -n_a[2] - h_a;
+            second.lower = second.upper + leg.k * h_a + g_a;
+        }
+        Ok(JointMotion { position: pack(&legs), velocity: pack(&rates), acceleration: pack(&accelerations) })
+    }
+
+    /// Inverse: the smaller of h/c and g/u; forward: |σ| (may exceed 1).
+    fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
+        let (_, legs) = self.reach(pose)?;
+        let mut worst =
+            Singularity { inverse: f64::MAX, inverse_joint: 0, forward: fabs(self.sigma_of(&legs)) };
+        for ((state, leg), joint) in legs.iter().zip(&self.legs).zip(0..) {
+            for (measure, joint) in [(state.h / leg.c, joint), (state.g / leg.u, joint + 3)] {
+                if measure < worst.inverse {
+                    (worst.inverse, worst.inverse_joint) = (measure, joint);
+                }
+            }
+        }
+        Ok(worst)
+    }
+
+    fn forward_branches(&self, joints: &Joints, seed: &Pose) -> Result<Branches<Pose>, ForwardError> {
+        let mut all = Branches::new();
+        if let Ok(pose) = self.forward(joints, seed) {
+            all.push(pose);
+        }
+        for &(pose, _) in self.forward_all(joints)?.as_slice() {
+            let same = |p: &Pose| fabs(p.c - pose.c) < 1e-7 && fabs(p.x - pose.x) < 1e-4;
+            if !all.as_slice().iter().any(same) {
+                all.push(pose);
+            }
+        }
+        Ok(all)
+    }
+}
