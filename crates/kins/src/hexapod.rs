@@ -132,12 +132,19 @@ impl Hexapod {
         Ok(struts)
     }
 
-    fn reach(&self, pose: &Pose) -> Result<(Attitude, [Strut; 6]), InverseError> {
-        // 1e12 mm: far beyond any machine, near enough that squares stay finite.
-        let place = [pose.x, pose.y, pose.z];
-        if !(pose.is_finite() && fabs(place[0]).max(fabs(place[1])).max(fabs(place[2])) < 1e12) {
-            return Err(InverseError::NotFinite);
+    /// 1e12 mm: far beyond any machine, near enough that squares stay finite.
+    #[inline]
+    fn finite(pose: &Pose) -> Result<(), InverseError> {
+        let near = fabs(pose.x) < 1e12 && fabs(pose.y) < 1e12 && fabs(pose.z) < 1e12;
+        if near && pose.a.is_finite() && pose.b.is_finite() && pose.c.is_finite() {
+            Ok(())
+        } else {
+            Err(InverseError::NotFinite)
         }
+    }
+
+    fn reach(&self, pose: &Pose) -> Result<(Attitude, [Strut; 6]), InverseError> {
+        Self::finite(pose)?;
         let at = Attitude::of(pose);
         let struts = self.struts(pose, &at)?;
         Ok((at, struts))
@@ -152,6 +159,21 @@ impl Hexapod {
             *row = [ux, uy, uz, mx, my, mz];
         }
         rows
+    }
+
+    /// ∂L/∂(v, ω): rows struts, columns v and ω in base axes; mm/mm and mm/rad.
+    ///
+    /// # Errors
+    /// As [`Kinematics::inverse`].
+    pub fn twist_jacobian(&self, pose: &Pose) -> Result<[[f64; 6]; 6], InverseError> {
+        let (_, struts) = self.reach(pose)?;
+        let mut rows = [[0.0; 6]; 6];
+        for (row, strut) in rows.iter_mut().zip(&struts) {
+            let [mx, my, mz] = cross(strut.arm, strut.unit);
+            let [ux, uy, uz] = strut.unit;
+            *row = [ux, uy, uz, mx, my, mz];
+        }
+        Ok(rows)
     }
 
     fn lengths(struts: &[Strut; 6]) -> Joints {
@@ -275,8 +297,16 @@ impl Kinematics for Hexapod {
     }
 
     fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
-        let (_, struts) = self.reach(pose)?;
-        Ok(Self::lengths(&struts))
+        Self::finite(pose)?;
+        let at = Attitude::of(pose);
+        let mut joints = [0.0; MAX_JOINTS];
+        for (((joint, a), b), number) in joints.iter_mut().zip(&self.platform).zip(&self.base).zip(0u8..) {
+            *joint = norm(sub(add([pose.x, pose.y, pose.z], at.rotate(*a)), *b));
+            if !(*joint > 1e-9) {
+                return Err(InverseError::ZeroStrut { joint: number });
+            }
+        }
+        Ok(joints)
     }
 
     /// Newton. Assumes the seed lies in the assembly wanted; guarantees residuals below 1e-10 mm (plus rounding of the lengths)

@@ -166,6 +166,17 @@ impl HvMachine {
         }
     }
 
+    /// The same state in the coordinates of the active mechanism alone.
+    #[cfg(feature = "nalgebra")]
+    pub(crate) fn mechanism_pose(&self, pose: &Pose) -> Pose {
+        let state = self.state(pose);
+        let [x, y, z] = state.w;
+        match self.active {
+            Spindle::H => Pose { x, y, z, b: state.table, ..Pose::ZERO },
+            Spindle::V => Pose { x, y, z, b: state.head, c: state.table, ..Pose::ZERO },
+        }
+    }
+
     /// A rate of a coordinate that the active mechanism does not have.
     fn idle_axis(&self, rate: &Pose) -> Option<Axis> {
         let idle: &[Axis] = match (self.active, self.head) {

@@ -17,6 +17,8 @@ pub mod lambda6;
 pub mod linear_delta;
 pub mod machine;
 pub mod maths;
+#[cfg(feature = "nalgebra")]
+pub mod matrix;
 pub mod moma;
 pub mod moma_4s;
 pub mod moma_w;

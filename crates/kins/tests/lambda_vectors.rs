@@ -3,7 +3,7 @@
 mod common;
 use common::*;
 use pkm_kins::maths::radians;
-use pkm_kins::{JointRange, Kinematics, Lambda6, Lambda6Parameters, Lambda6Set, Pose};
+use pkm_kins::{JointRange, Kinematics, Lambda6, Lambda6Parameters, Lambda6Set, Mechanism, Pose};
 use serde_json::Value;
 
 fn set(name: &Value) -> Lambda6Parameters {
@@ -90,6 +90,10 @@ fn val_poses() {
         close_rel(det, number(&row["det_twist_mm3"]), det, 1e-8, what);
         let det = determinant(full[..6].iter().map(|r| r[..6].to_vec()).collect());
         close_rel(det, number(&row["det_pose_mm3"]), det, 1e-8, what);
+
+        let dexterity = Mechanism::from(free).dexterity(&p).unwrap();
+        close_rel(dexterity.determinant, det, det, 1e-9, what);
+        close_rel(dexterity.condition, number(&row["cond"]), dexterity.condition, 1e-7, what);
 
         // Forward: every assembly, and the one a seed on the right side asks for.
         let all = free.forward_all(&joints(&expected)).unwrap();
@@ -189,24 +193,4 @@ fn val_home_of_yaw45_and_table_1() {
             }
         }
     }
-}
-
-fn determinant(mut m: Vec<Vec<f64>>) -> f64 {
-    let n = m.len();
-    let mut det = 1.0;
-    for c in 0..n {
-        let pivot = (c..n).max_by(|a, b| m[*a][c].abs().total_cmp(&m[*b][c].abs())).unwrap();
-        if pivot != c {
-            m.swap(pivot, c);
-            det = -det;
-        }
-        det *= m[c][c];
-        for r in c + 1..n {
-            let f = m[r][c] / m[c][c];
-            for k in c..n {
-                m[r][k] -= f * m[c][k];
-            }
-        }
-    }
-    det
 }

@@ -259,31 +259,12 @@ fn val_moma_w() {
         // det ∂(p1..p4)/∂(x,y,u,v): the columns 0, 1, 6, 7.
         let m: Vec<Vec<f64>> = j[..4].iter().map(|r| vec![r[0], r[1], r[6], r[7]]).collect();
         close_rel(determinant(m), row[14], row[14], 1e-9, "det J4");
+        let dexterity = pkm_kins::Mechanism::from(machine).dexterity(&pose).unwrap();
+        close_rel(dexterity.determinant, row[14], row[14], 1e-9, "det J5 = det J4");
     }
     let ranges = [[0.0, 200.0], [0.0, 200.0], [0.0, 200.0], [0.0, 200.0], [0.0, 100.0]].map(range);
     for row in rows(&table["bad"]) {
         let code = inverse_code(&machine, &ranges, &pose(&numbers(row)));
         one_of(code, &codes(&row[5]), &format!("moma-w bad {row}"));
     }
-}
-
-/// Gauss with column pivots.
-fn determinant(mut m: Vec<Vec<f64>>) -> f64 {
-    let n = m.len();
-    let mut det = 1.0;
-    for c in 0..n {
-        let pivot = (c..n).max_by(|a, b| m[*a][c].abs().total_cmp(&m[*b][c].abs())).unwrap();
-        if pivot != c {
-            m.swap(pivot, c);
-            det = -det;
-        }
-        det *= m[c][c];
-        for r in c + 1..n {
-            let f = m[r][c] / m[c][c];
-            for k in c..n {
-                m[r][k] -= f * m[c][k];
-            }
-        }
-    }
-    det
 }

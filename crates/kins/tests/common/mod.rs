@@ -83,3 +83,21 @@ pub fn joints(values: &[f64]) -> pkm_kins::Joints {
 pub fn xy(x: f64, y: f64) -> Pose {
     Pose { x, y, ..Pose::ZERO }
 }
+
+/// Gauss with row pivots.
+pub fn determinant(mut m: Vec<Vec<f64>>) -> f64 {
+    let mut det = 1.0;
+    while !m.is_empty() {
+        let pivot = (0..m.len()).max_by(|a, b| m[*a][0].abs().total_cmp(&m[*b][0].abs())).unwrap();
+        if pivot % 2 == 1 {
+            det = -det;
+        }
+        let first = m.remove(pivot);
+        det *= first[0];
+        for row in &mut m {
+            let factor = row[0] / first[0];
+            *row = row.iter().zip(&first).skip(1).map(|(x, p)| x - factor * p).collect();
+        }
+    }
+    det
+}
