@@ -99,6 +99,13 @@ pub enum Fault {
         /// mm or degrees
         limit: f64,
     },
+    /// A parameter was set to what the component cannot use.
+    Parameter {
+        /// Servo period.
+        tick: u64,
+        /// The parameter.
+        pin: PinName,
+    },
     /// A step generator refused its target.
     Steps {
         /// Servo period.
@@ -152,6 +159,7 @@ impl fmt::Display for Fault {
             Self::OutOfTravel { tick, pin, value, limit } => {
                 write!(f, "{pin} is {value} at tick {tick}, beyond the end of travel at {limit}")
             }
+            Self::Parameter { tick, pin } => write!(f, "{pin} cannot be used as it is set, at tick {tick}"),
             Self::Steps { tick, joint, error } => write!(f, "stepgen.{joint} at tick {tick}: {error}"),
         }
     }

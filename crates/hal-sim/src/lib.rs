@@ -16,6 +16,7 @@
 //! Time is an integer count of timer ticks; there is no clock. A [`Hal`] and a [`Simulation`] are `Clone`: a copy goes
 //! on from the same state.
 
+pub mod block;
 pub mod component;
 pub mod components;
 pub mod hal;

@@ -235,7 +235,12 @@ impl Simulation {
             });
             let scale = shown_scale(joint.kind, joint.steps_per_unit);
             let start = joint.start * (joint.steps_per_unit / scale);
-            stepgen.push(StepgenChannel { position_scale: scale, timing: joint.timing, start });
+            stepgen.push(StepgenChannel {
+                position_scale: scale,
+                timing: joint.timing,
+                start,
+                enabled: true,
+            });
             let start = at_start.count();
             drivers.push(DriverChannel { minimum: joint.driver_minimum, start });
             motors.push(MotorChannel { scale, start });

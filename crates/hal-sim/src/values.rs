@@ -75,6 +75,8 @@ pub struct U32Pin(pub(crate) u32);
 pub(crate) struct Bank<T> {
     pub(crate) cells: Vec<T>,
     pub(crate) pins: Vec<u32>,
+    /// A pin's own cell, where it points while it is not linked.
+    pub(crate) own: Vec<u32>,
 }
 
 impl<T: Copy> Bank<T> {
@@ -88,6 +90,7 @@ impl<T: Copy> Bank<T> {
     pub(crate) fn pin(&mut self, value: T) -> u32 {
         let cell = self.cell(value);
         self.pins.push(cell);
+        self.own.push(cell);
         self.pins.len() as u32 - 1
     }
 
@@ -226,6 +229,12 @@ impl Values {
     #[inline]
     pub fn set_u32(&mut self, pin: U32Pin, value: u32) {
         self.u32s.set(pin.0, value);
+    }
+
+    /// Whether a float pin is linked to a signal.
+    #[inline]
+    pub fn float_is_linked(&self, pin: FloatPin) -> bool {
+        self.floats.pins[pin.0 as usize] != self.floats.own[pin.0 as usize]
     }
 
     /// The edges inside the period on the line that a bit pin is linked to.

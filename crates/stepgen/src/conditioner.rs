@@ -100,6 +100,11 @@ impl Conditioner {
         &self.report
     }
 
+    /// Another timing from the next step on.
+    pub const fn set_timing(&mut self, timing: PulseTiming) {
+        self.timing = timing;
+    }
+
     /// The timing that is kept.
     pub const fn timing(&self) -> &PulseTiming {
         &self.timing

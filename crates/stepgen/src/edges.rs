@@ -197,6 +197,26 @@ impl Crossings {
         &self.cubic
     }
 
+    /// Moves to `position` (steps) on a straight line: for commands without velocity. Otherwise as [`Self::advance`].
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn advance_straight(
+        &mut self,
+        position: f64,
+        period: &Period,
+        max_steps: u64,
+        emit: &mut impl FnMut(u64, bool),
+    ) -> Result<(), EdgeError> {
+        let before = *self;
+        self.velocity = (on_grid(position)? - self.position) as f64 / ONE / period.seconds();
+        let result = self.advance(position, self.velocity, period, max_steps, emit);
+        if result.is_err() {
+            *self = before;
+        }
+        result
+    }
+
     /// Moves to `position` (steps), reached with `velocity` (steps/s) at the end of `period`; `emit(time, forward)`
     /// receives every crossing in order, times in (start, end].
     ///

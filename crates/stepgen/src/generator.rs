@@ -47,11 +47,7 @@ impl StepGenerator {
         period: &Period,
         mut sink: impl FnMut(Edge),
     ) -> Result<(), EdgeError> {
-        let delay = self.conditioner.earliest_step().saturating_sub(period.start());
-        if delay > u64::from(period.ticks()) {
-            return Err(EdgeError::Late { delay });
-        }
-        let max_steps = self.conditioner.timing().max_steps(period);
+        let max_steps = self.max_steps(period)?;
         let known_from = period.start().saturating_add(1);
         let conditioner = &mut self.conditioner;
         self.crossings.advance(
@@ -61,6 +57,49 @@ impl StepGenerator {
             max_steps,
             &mut |time, forward| conditioner.step(time, forward, known_from, &mut sink),
         )
+    }
+
+    /// As [`Self::advance`], on a straight line: for commands without velocity.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn advance_straight(
+        &mut self,
+        position: f64,
+        period: &Period,
+        mut sink: impl FnMut(Edge),
+    ) -> Result<(), EdgeError> {
+        let max_steps = self.max_steps(period)?;
+        let known_from = period.start().saturating_add(1);
+        let conditioner = &mut self.conditioner;
+        self.crossings.advance_straight(
+            position * self.steps_per_unit,
+            period,
+            max_steps,
+            &mut |time, forward| conditioner.step(time, forward, known_from, &mut sink),
+        )
+    }
+
+    /// The most steps in a period; an error if delays have piled up.
+    fn max_steps(&self, period: &Period) -> Result<u64, EdgeError> {
+        let delay = self.conditioner.earliest_step().saturating_sub(period.start());
+        if delay > u64::from(period.ticks()) {
+            return Err(EdgeError::Late { delay });
+        }
+        Ok(self.conditioner.timing().max_steps(period))
+    }
+
+    /// Other pulse times and steps per mm or rad from now on; the count stays.
+    ///
+    /// # Errors
+    /// `NotFinite` if `steps_per_unit` is not finite or 0.
+    pub fn configure(&mut self, steps_per_unit: f64, timing: PulseTiming) -> Result<(), EdgeError> {
+        if !steps_per_unit.is_finite() || steps_per_unit == 0.0 {
+            return Err(EdgeError::NotFinite);
+        }
+        self.steps_per_unit = steps_per_unit;
+        self.conditioner.set_timing(timing);
+        Ok(())
     }
 
     /// Stands still at the step `count`, e.g. after pulses were cut off by an emergency stop: the commanded position is

@@ -3,13 +3,13 @@
 //! | pin or parameter             | type      | meaning                                                        |
 //! |------------------------------|-----------|----------------------------------------------------------------|
 //! | `stepgen.N.position-cmd`     | float in  | position at the end of the period, mm or degrees               |
-//! | `stepgen.N.velocity-cmd`     | float in  | velocity there, mm/s or degrees/s                              |
+//! | `stepgen.N.velocity-cmd`     | float in  | velocity there, mm/s or degrees/s; not linked: straight lines  |
 //! | `stepgen.N.enable`           | bit in    | false: no step begins; the generator stands where the steps stand |
 //! | `stepgen.N.step`, `.dir`     | bit out   | the lines, with their edges inside the period; dir high = positive |
 //! | `stepgen.N.counts`           | s32 out   | steps so far (wraps)                                           |
 //! | `stepgen.N.position-fb`      | float out | counts / scale                                                 |
-//! | `stepgen.N.position-scale`   | float ro  | steps per mm or degree                                         |
-//! | `stepgen.N.steplen`, `.stepspace`, `.dirsetup`, `.dirhold` | u32 ro | ns, as the edges keep them |
+//! | `stepgen.N.position-scale`   | float rw  | steps per mm or degree, not 0                                  |
+//! | `stepgen.N.steplen`, `.stepspace`, `.dirsetup`, `.dirhold` | u32 rw | ns; kept rounded up to the timer |
 //! | `stepgen.N.max-delay`        | u32 ro    | largest delay of a step for these times, ns                    |
 //!
 //! Functions: `stepgen.update-freq` makes the edges of the period, `stepgen.capture-position` shows counts and position;
@@ -17,10 +17,10 @@
 //!
 //! Unlike LinuxCNC's, whose position lags by 1.5 servo periods, this one reaches the command at the period's end.
 
-use crate::component::{Component, Fault, Tick};
+use crate::component::{Component, Fault, PinIndex, PinName, Tick};
 use crate::hal::{Hal, HalError, Role};
 use crate::values::{BitPin, EdgeQueue, FloatPin, LineEdge, S32Pin, U32Pin, Values};
-use pkm_stepgen::{EdgeError, Line, PulseTimingNs, StepGenerator};
+use pkm_stepgen::{Edge, EdgeError, Line, PulseTimingNs, StepGenerator};
 
 /// One channel as configured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +31,8 @@ pub struct StepgenChannel {
     pub timing: PulseTimingNs,
     /// Where the joint stands at the start, mm or degrees.
     pub start: f64,
+    /// Whether the generator is enabled while `enable` is not linked.
+    pub enabled: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -43,6 +45,11 @@ struct Pins {
     counts: S32Pin,
     position_fb: FloatPin,
     max_delay: U32Pin,
+    position_scale: FloatPin,
+    /// steplen, stepspace, dirsetup, dirhold
+    times: [U32Pin; 4],
+    /// What the generator was configured with.
+    configured: (f64, [u32; 4]),
 }
 
 /// See the module.
@@ -83,25 +90,28 @@ impl Stepgen {
             let owner = "stepgen";
             let counts = generator.count() as i32;
             let position = generator.position_of(generator.count());
+            let scale = channel.position_scale;
+            let PulseTimingNs { step_length, step_space, dir_setup, dir_hold } = channel.timing;
+            let times = [step_length, step_space, dir_setup, dir_hold]
+                .map(|time| u32::try_from(time).unwrap_or(u32::MAX));
             let pins = Pins {
                 position_cmd: hal.new_float(owner, &name("position-cmd"), Role::In, channel.start)?,
                 velocity_cmd: hal.new_float(owner, &name("velocity-cmd"), Role::In, 0.0)?,
-                enable: hal.new_bit(owner, &name("enable"), Role::In, true)?,
+                enable: hal.new_bit(owner, &name("enable"), Role::In, channel.enabled)?,
                 step: hal.new_bit(owner, &name("step"), Role::Out, false)?,
                 dir: hal.new_bit(owner, &name("dir"), Role::Out, false)?,
                 counts: hal.new_s32(owner, &name("counts"), Role::Out, counts)?,
                 position_fb: hal.new_float(owner, &name("position-fb"), Role::Out, position)?,
                 max_delay: hal.new_u32(owner, &name("max-delay"), Role::ReadOnly, 0)?,
+                position_scale: hal.new_float(owner, &name("position-scale"), Role::Parameter, scale)?,
+                times: [
+                    hal.new_u32(owner, &name("steplen"), Role::Parameter, times[0])?,
+                    hal.new_u32(owner, &name("stepspace"), Role::Parameter, times[1])?,
+                    hal.new_u32(owner, &name("dirsetup"), Role::Parameter, times[2])?,
+                    hal.new_u32(owner, &name("dirhold"), Role::Parameter, times[3])?,
+                ],
+                configured: (scale, times),
             };
-            hal.new_float(owner, &name("position-scale"), Role::ReadOnly, channel.position_scale)?;
-            for (pin, ticks) in [
-                ("steplen", timing.step_length()),
-                ("stepspace", timing.step_space()),
-                ("dirsetup", timing.dir_setup()),
-                ("dirhold", timing.dir_hold()),
-            ] {
-                hal.new_u32(owner, &name(pin), Role::ReadOnly, nanoseconds(ticks, timer_period_ns))?;
-            }
             with_pins.push((generator, pins));
         }
         let functions = ["make-pulses", "update-freq", "capture-position"].map(|f| format!("stepgen.{f}"));
@@ -118,16 +128,23 @@ impl Stepgen {
         let (start, end) = (tick.period.start(), tick.period.end());
         for (n, (generator, pins)) in self.channels.iter_mut().enumerate() {
             let enabled = values.bit(pins.enable);
+            configure(generator, pins, values, self.timer_period_ns)
+                .map_err(|pin| Fault::Parameter { tick: tick.number, pin: parameter(n, pin) })?;
             let mut steps = values.take_edges(pins.step);
             let mut turns = values.take_edges(pins.dir);
             steps.retire(start);
             turns.retire(start);
             let result = if enabled {
-                let (position, velocity) = (values.float(pins.position_cmd), values.float(pins.velocity_cmd));
-                generator.advance(position, velocity, &tick.period, |edge| match edge.line {
+                let sink = |edge: Edge| match edge.line {
                     Line::Step => steps.push(edge.time, edge.level),
                     Line::Dir => turns.push(edge.time, edge.level),
-                })
+                };
+                let position = values.float(pins.position_cmd);
+                if values.float_is_linked(pins.velocity_cmd) {
+                    generator.advance(position, values.float(pins.velocity_cmd), &tick.period, sink)
+                } else {
+                    generator.advance_straight(position, &tick.period, sink)
+                }
             } else {
                 // steps that were to come late do not come; a pulse that has begun ends
                 let missing = net_steps(&steps, &turns, values.bit(pins.dir));
@@ -149,6 +166,29 @@ impl Stepgen {
             values.set_u32(pins.max_delay, delay);
         }
     }
+}
+
+/// Takes up parameters that were set; the name of one that cannot be used.
+fn configure(
+    generator: &mut StepGenerator,
+    pins: &mut Pins,
+    values: &Values,
+    timer_period_ns: u64,
+) -> Result<(), &'static str> {
+    let wanted = (values.float(pins.position_scale), pins.times.map(|pin| values.u32(pin)));
+    if wanted == pins.configured {
+        return Ok(());
+    }
+    let (scale, [step_length, step_space, dir_setup, dir_hold]) = (wanted.0, wanted.1.map(u64::from));
+    let timing = PulseTimingNs { step_length, step_space, dir_setup, dir_hold };
+    let ticks = timing.ticks(timer_period_ns).map_err(|_| "steplen")?;
+    generator.configure(scale, ticks).map_err(|_| "position-scale")?;
+    pins.configured = wanted;
+    Ok(())
+}
+
+const fn parameter(n: usize, pin: &'static str) -> PinName {
+    PinName { owner: "stepgen", index: PinIndex::Number(n as u8), pin }
 }
 
 /// Steps forward less steps back on lines of which `dir` is the direction's level before the first edge.
