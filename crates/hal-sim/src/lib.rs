@@ -20,6 +20,8 @@ pub mod block;
 pub mod component;
 pub mod components;
 pub mod hal;
+pub mod hal_file;
+pub mod modules;
 pub mod simulation;
 pub mod trace;
 pub mod values;
