@@ -209,7 +209,7 @@ fn solve(rows: &[[f64; 6]; 6], right: &[f64; 6]) -> Option<Solved> {
     for column in 0..6 {
         let mut best = column;
         let mut size = 0.0;
-        for (i, row) in m.iter().enumerate().skip(column) {
+        for (i, row) in (column..6).zip(m.iter().skip(column)) {
             let entry = fabs(*row.get(column)?);
             if entry > size {
                 (best, size) = (i, entry);
@@ -220,17 +220,16 @@ fn solve(rows: &[[f64; 6]; 6], right: &[f64; 6]) -> Option<Solved> {
         }
         if best != column {
             // `swap` without an index that could be out of range.
-            let (above, below) = m.split_at_mut(best);
+            let (above, below) = m.split_at_mut_checked(best)?;
             core::mem::swap(above.get_mut(column)?, below.first_mut()?);
             determinant = -determinant;
         }
-        let (done, below) = m.split_at_mut(column + 1);
-        let pivot = done.last()?;
+        let (pivot, below) = m.get_mut(column..)?.split_first_mut()?;
         let head = *pivot.get(column)?;
         determinant *= head;
         for row in below {
             let factor = *row.get(column)? / head;
-            for (entry, p) in row.iter_mut().zip(pivot).skip(column) {
+            for (entry, p) in row.iter_mut().zip(pivot.iter()).skip(column) {
                 *entry -= factor * p;
             }
         }
@@ -239,7 +238,7 @@ fn solve(rows: &[[f64; 6]; 6], right: &[f64; 6]) -> Option<Solved> {
     for column in (0..6).rev() {
         let row = m.get(column)?;
         let mut sum = row[6];
-        for (entry, known) in row.iter().zip(&x).skip(column + 1) {
+        for (entry, known) in row.iter().zip(&x).skip(column).skip(1) {
             sum -= entry * known;
         }
         *x.get_mut(column)? = sum / *row.get(column)?;

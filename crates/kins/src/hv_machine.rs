@@ -307,6 +307,6 @@ impl Kinematics for HvMachine {
 
     fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
         let s = self.mechanism().singularity_of(&self.state(pose))?;
-        Ok(Singularity { inverse_joint: s.inverse_joint + self.first_joint(), ..s })
+        Ok(Singularity { inverse_joint: s.inverse_joint.saturating_add(self.first_joint()), ..s })
     }
 }

@@ -84,7 +84,7 @@ impl JointRange {
 
     /// Checks the joints against their travel and names the first one outside.
     pub fn check(ranges: &[JointRange], joints: &Joints) -> Result<(), JointLimit> {
-        for (joint, (range, &value)) in ranges.iter().zip(joints).enumerate() {
+        for ((range, &value), joint) in ranges.iter().zip(joints).zip(0..MAX_JOINTS) {
             if !(value >= range.min - Self::TOLERANCE) {
                 return Err(JointLimit { joint, side: Side::Low, value, limit: range.min });
             }
@@ -140,7 +140,7 @@ impl<T: Copy + Default + PartialEq> Branches<T> {
         }
         if let Some(place) = self.items.get_mut(self.count) {
             *place = item;
-            self.count += 1;
+            self.count = self.count.saturating_add(1);
         }
     }
 

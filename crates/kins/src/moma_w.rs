@@ -356,7 +356,7 @@ impl Kinematics for MomaW {
         let t = m2.planar.measures(&m2.planar.solve(p2).map_err(|e| e.of_mechanism(1))?);
         let forward = s.forward.min(t.forward);
         Ok(if t.inverse < s.inverse {
-            Singularity { inverse: t.inverse, inverse_joint: 2 + t.inverse_joint, forward }
+            Singularity { inverse: t.inverse, inverse_joint: t.inverse_joint.saturating_add(2), forward }
         } else {
             Singularity { forward, ..s }
         })
