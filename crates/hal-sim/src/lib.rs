@@ -11,7 +11,8 @@
 //! * [`Hal`]: pins, signals, parameters, functions, threads.
 //! * [`components`]: one file each, the same order in each: what it is → pins → state → functions → tests.
 //! * [`Simulation`]: the machine above ready-wired, one call per servo period, with statistics and observers.
-//! * [`VcdWriter`], [`TraceWriter`]: observers that write `steps.vcd` and `trace.csv`.
+//! * [`VcdWriter`], [`TraceWriter`], [`StreamWriter`]: observers that write `steps.vcd`, `trace.csv` and a compact stream.
+//! * [`hal_file`]: HAL files, as people know them.
 //!
 //! Time is an integer count of timer ticks; there is no clock. A [`Hal`] and a [`Simulation`] are `Clone`: a copy goes
 //! on from the same state.
@@ -23,6 +24,7 @@ pub mod hal;
 pub mod hal_file;
 pub mod modules;
 pub mod simulation;
+pub mod stream;
 pub mod trace;
 pub mod values;
 pub mod vcd;
@@ -35,6 +37,7 @@ pub use simulation::{
     ConfigError, JointConfig, JointState, JointStatistics, Observer, Simulation, SimulationConfig, TickError,
     TickReport,
 };
+pub use stream::{StreamSteps, StreamWriter};
 pub use trace::TraceWriter;
 pub use values::{BitPin, FloatPin, PinType, S32Pin, U32Pin, Value, Values};
 pub use vcd::{VcdSteps, VcdWriter};

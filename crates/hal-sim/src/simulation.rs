@@ -12,7 +12,7 @@ use crate::hal::{Hal, HalError};
 use crate::values::{BitPin, FloatPin};
 use pkm_kins::maths::{PI, radians};
 use pkm_kins::{AxisSet, ForwardError, JointKind, JointRange, Joints, Kinematics, MAX_JOINTS, Pose};
-use pkm_stepgen::{Edge, EdgeError, Line, Period, PulseTimingNs, StepGenerator};
+use pkm_stepgen::{Edge, EdgeError, Line, Period, PulseTiming, PulseTimingNs, StepGenerator};
 use std::any::Any;
 use std::fmt;
 
@@ -508,6 +508,11 @@ impl Simulation {
     /// Steps per mm or rad, in joint order.
     pub fn steps_per_unit(&self) -> impl Iterator<Item = f64> {
         self.lines.iter().map(|line| line.steps_per_unit)
+    }
+
+    /// Pulse times as the edges keep them, in joint order.
+    pub fn pulse_timings(&self) -> impl Iterator<Item = &PulseTiming> {
+        self.generators().map(StepGenerator::timing)
     }
 
     /// Servo period, ns.

@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::{machine, wave};
-use pkm_hal_sim::{TraceWriter, VcdSteps, VcdWriter};
+use common::{SERVO_NS, machine, wave};
+use pkm_hal_sim::{StreamSteps, StreamWriter, TraceWriter, VcdSteps, VcdWriter};
 use pkm_kins::cartesian::Cartesian;
 use pkm_kins::{Axis, AxisSet};
 use std::io::{self, Write};
@@ -88,4 +88,38 @@ fn substeps_show_the_path_between_the_ticks() {
         rows = i + 1;
     }
     assert_eq!(rows, 15_001);
+}
+
+#[test]
+fn vcd_trace_and_stream_decode_to_the_same_positions() {
+    for tolerance in [0, 2, 10] {
+        let (mut simulation, mut source) = machine(5);
+        let starts: Vec<i64> = simulation.report().joints.iter().map(|joint| joint.count).collect();
+        let mut vcd = VcdWriter::new(Vec::new(), &simulation);
+        let mut stream = StreamWriter::new(Vec::new(), &simulation, tolerance);
+        let mut counts = Vec::new();
+        for _ in 0..1000 {
+            let report = simulation.tick(&mut source, &mut [&mut vcd, &mut stream]).unwrap();
+            counts.push(report.joints.iter().map(|joint| joint.count).collect::<Vec<_>>());
+        }
+        let (vcd, stream) = (vcd.finish().unwrap(), stream.finish().unwrap());
+        let mut from_vcd = VcdSteps::new(vcd.as_slice()).unwrap();
+        let mut from_stream = StreamSteps::new(&stream).unwrap();
+        for (tick, expected) in (1..).zip(&counts) {
+            let time_ns = tick * SERVO_NS;
+            let absolute = |counts: &[i64]| -> Vec<i64> {
+                counts.iter().zip(&starts).map(|(count, start)| count + start).collect()
+            };
+            assert_eq!(absolute(from_vcd.counts_at(time_ns).unwrap()), *expected, "tick {tick}");
+            assert_eq!(absolute(from_stream.counts_at(time_ns)), *expected, "tick {tick}");
+        }
+        assert!(stream.len() * 10 < vcd.len(), "{} {}", stream.len(), vcd.len());
+        // a damaged stream is refused
+        assert!(StreamSteps::new(&stream[..stream.len() - 1]).is_err());
+        assert!(StreamSteps::new(&[]).is_err());
+        let mut bad = stream;
+        let middle = bad.len() / 2;
+        bad[middle] ^= 1;
+        assert!(StreamSteps::new(&bad).is_err());
+    }
 }

@@ -179,11 +179,8 @@ loadrt not count=2
 addf not.0 servo-thread
 addf safe servo-thread
 net go not.0.out => safe.in0
-sets go 1
 show
-"
-    .replace("sets go 1\n", "")
-    .as_str());
+");
     let expected = "\
 Loaded components:
   and2

@@ -137,6 +137,11 @@ impl StepGenerator {
         self.steps_per_unit
     }
 
+    /// The pulse times that are kept.
+    pub const fn timing(&self) -> &PulseTiming {
+        self.conditioner.timing()
+    }
+
     /// What the conditioner did so far.
     pub const fn report(&self) -> &ConditionerReport {
         self.conditioner.report()

@@ -30,9 +30,11 @@
 pub mod conditioner;
 pub mod edges;
 pub mod generator;
+pub mod runs;
 pub mod timing;
 
 pub use conditioner::{Conditioner, ConditionerReport, Edge, Line};
 pub use edges::{Crossings, EdgeError};
 pub use generator::StepGenerator;
+pub use runs::{Run, RunError, RunLimits};
 pub use timing::{Period, PulseTiming, PulseTimingNs, TimingError};
