@@ -3,13 +3,23 @@
 //! what is permitted; the strips hold in every one of them, on the path.
 
 use crate::PlanError;
-use crate::interval::exits;
+use crate::interval::{accelerations, exits};
 use crate::limits::Rows;
 use crate::planner::{Planner, Setpoint, State};
 use pkm_kins::{Kinematics, Pose, maths::sqrt};
 
 /// Nodes passed in one tick at the very most (the grid holds the speed down to about 128).
 const MOST_NODES: usize = 1024;
+
+/// A stretch of an interval driven at constant acceleration: where it ends (distance from the node) and with which x.
+#[derive(Debug, Clone, Copy, Default)]
+struct Leg {
+    end: f64,
+    x: f64,
+}
+
+/// Up, along, down.
+type Legs = heapless::Vec<Leg, 3>;
 
 /// Where the machine is between the two nodes at the front, and what it is doing there.
 #[derive(Debug, Clone)]
@@ -18,9 +28,8 @@ pub(crate) struct Executor {
     sigma: f64,
     /// ṡ² here.
     x: f64,
-    /// The leg being driven at constant acceleration: it ends at `leg_end` (distance from the node) with `x_end`.
-    leg_end: f64,
-    x_end: f64,
+    /// The legs still to be driven to the next node, the present one first.
+    legs: Legs,
     planned: bool,
     /// Number of the next setpoint within its servo period, from 0.
     substep: u32,
@@ -38,8 +47,7 @@ impl Executor {
         Self {
             sigma: 0.0,
             x: 0.0,
-            leg_end: 0.0,
-            x_end: 0.0,
+            legs: Legs::default(),
             planned: false,
             substep: 0,
             waits: false,
@@ -201,28 +209,31 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 return true;
             }
             let e = &mut self.executor;
-            let leg = e.leg_end - e.sigma;
-            let (v, v_end) = (sqrt(e.x), sqrt(e.x_end));
-            let duration = if v + v_end > 0.0 { 2.0 * leg / (v + v_end) } else { f64::INFINITY };
+            let Some(&leg) = e.legs.first() else { return true };
+            let distance = leg.end - e.sigma;
+            let (v, v_end) = (sqrt(e.x), sqrt(leg.x));
+            let duration = if v + v_end > 0.0 { 2.0 * distance / (v + v_end) } else { f64::INFINITY };
             if !(duration <= remaining) {
-                if leg > 0.0 && duration.is_finite() {
-                    let acceleration = (e.x_end - e.x) / (2.0 * leg);
+                if distance > 0.0 && duration.is_finite() {
+                    let acceleration = (leg.x - e.x) / (2.0 * distance);
                     let speed = (v + acceleration * remaining).max(0.0);
-                    e.sigma = (e.sigma + 0.5 * (v + speed) * remaining).min(e.leg_end);
+                    e.sigma = (e.sigma + 0.5 * (v + speed) * remaining).min(leg.end);
                     e.x = speed * speed;
                 }
                 return false;
             }
             remaining -= duration;
-            e.x = e.x_end;
-            e.planned = false;
-            if e.leg_end < length {
-                e.sigma = e.leg_end;
+            e.x = leg.x;
+            e.legs.remove(0);
+            if leg.end < length {
+                e.sigma = leg.end;
                 if e.x == 0.0 && held {
+                    e.planned = false;
                     return true;
                 }
                 continue;
             }
+            e.planned = false;
             e.sigma = 0.0;
             self.pass_node();
             if self.nodes.front().is_some_and(|node| node.stop) || self.executor.x == 0.0 {
@@ -258,39 +269,52 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             here = sample.rows;
         }
         let (feed, rapid) = self.executor.overrides();
-        let (mut leg_end, mut x_end);
+        let running = self.executor.legs.last().map_or(0.0, |leg| leg.x);
+        let mut legs = Legs::new();
+        let mut add = |end: f64, x: f64| {
+            // The end of the interval is the node itself, not a sum.
+            let end = if end < length { sigma + end } else { node.length };
+            let _ = legs.push(Leg { end, x: x.max(0.0) });
+        };
         if held {
             if x == 0.0 {
                 return false;
             }
-            (leg_end, x_end) = braking(&here, &next.left, rows, length, x, self.executor.x_end);
+            let (end, x_end) = braking(&here, &next.left, rows, length, x, running);
+            add(end, x_end);
         } else {
             let (low, high) = exits(&here, &next.left, rows, length, x);
-            // From the middle of an interval the strips may miss each other by what changes within it; the leg being
+            // From the middle of an interval the strips may miss each other by what changes within it; what is being
             // driven stays admissible.
-            x_end = match low <= high {
+            let x_end = match low <= high {
                 true => next.entry.clamp(low, high),
-                false if sigma > 0.0 => self.executor.x_end,
+                false if sigma > 0.0 => running,
                 false => 0.5 * (low + high),
             };
-            leg_end = length;
-            if x == 0.0 && x_end == 0.0 && length > 0.0 {
-                // From rest to rest within one interval (resumed after a hold): up to the middle, then down.
-                let cap = node.cap(feed, rapid).max(next.cap(feed, rapid));
-                x_end =
-                    halfway(&here, &next.left, rows, length).min(if node.stop { f64::INFINITY } else { cap });
-                leg_end = 0.5 * length;
-                if !(x_end > 0.0)
-                    || self.nodes.len() == 2 && !next.stop && self.pieces.back().is_some_and(|p| p.open)
-                {
-                    return false;
+            if x == 0.0 && self.nodes.len() == 2 && self.pieces.back().is_some_and(|last| last.open) {
+                // At rest with one interval known and more to come.
+                return false;
+            }
+            // A stop to the left does not cap what is in between.
+            let cap = node.speed_cap(feed, rapid).min(next.speed_cap(feed, rapid));
+            match faster(&here, &next.left, rows, length, x, x_end, cap) {
+                Some((up, along, peak)) => {
+                    if up > 0.0 {
+                        add(up, peak);
+                    }
+                    if along > up {
+                        add(along, peak);
+                    }
                 }
+                None if x == 0.0 && x_end == 0.0 => return false,
+                None => {}
+            }
+            if legs_end(&legs) < node.length {
+                let _ = legs.push(Leg { end: node.length, x: x_end.max(0.0) });
             }
         }
-        let e = &mut self.executor;
-        e.leg_end = if leg_end < length { sigma + leg_end } else { sigma + length };
-        e.x_end = x_end.max(0.0);
-        e.planned = true;
+        self.executor.legs = legs;
+        self.executor.planned = true;
         true
     }
 
@@ -343,29 +367,48 @@ fn braking<const R: usize>(
     if low > 0.0 {
         return (length, low);
     }
-    // The strips must hold from x down to rest at both ends: |d₁ a + d₂ x| ≤ 1 and |d₁ a| ≤ 1.
-    let mut hardest = f64::INFINITY;
-    for side in [here, next] {
-        for (first, second) in side.first.iter().zip(&side.second).take(rows) {
-            let (first, bend) = if *first > 0.0 { (*first, *second) } else { (-first, -second) };
-            // a = −b: −first·b + bend·x ≥ −1, and the same at x = 0
-            let room = (1.0 + bend * x).min(1.0);
-            if first > 0.0 {
-                hardest = hardest.min(room / first);
-            }
-        }
-    }
+    let hardest = -accelerations(here, next, rows, 0.0, x).0;
     let needed = x / (2.0 * length);
     if hardest > needed { (x / (2.0 * hardest), 0.0) } else { (length, 0.0) }
 }
 
-/// The x reached in the middle of an interval entered and left at rest.
-fn halfway<const R: usize>(here: &Rows<R>, next: &Rows<R>, rows: usize, length: f64) -> f64 {
-    let mut steepest = 0.0_f64;
-    for side in [here, next] {
-        for (first, second) in side.first.iter().zip(&side.second).take(rows) {
-            steepest = steepest.max(first.abs() + second.abs() * length);
-        }
+fn legs_end(legs: &Legs) -> f64 {
+    legs.last().map_or(0.0, |leg| leg.end)
+}
+
+/// The fastest way through an interval entered with `x` and left with `x_end`: up to a peak (or the cap), along it, down
+/// again. Returns where the first two legs end and the peak, or `None` where one acceleration throughout is as fast.
+fn faster<const R: usize>(
+    here: &Rows<R>,
+    next: &Rows<R>,
+    rows: usize,
+    length: f64,
+    x: f64,
+    x_end: f64,
+    cap: f64,
+) -> Option<(f64, f64, f64)> {
+    let (bottom, top) = (x.min(x_end), x.max(x_end));
+    let cap = cap.max(top);
+    // What the strips allow depends on the highest x there will be, and that on what they allow. A lower guess gives
+    // a higher peak and the other way round, so the third is safe: its peak does not exceed what it was computed for.
+    let meet = |highest: f64| {
+        let (down, up) = accelerations(here, next, rows, bottom, highest);
+        let peak = (2.0 * length + x / up - x_end / down) / (1.0 / up - 1.0 / down);
+        (down < 0.0 && up > 0.0).then_some((peak.min(cap), up, -down))
+    };
+    let (first, ..) = meet(cap)?;
+    let (second, ..) = meet(first.max(top))?;
+    let (peak, up, down) = meet(second.max(top))?;
+    // Not worth a change of acceleration.
+    if !(peak >= top) || !(peak - bottom > 1e-9 * peak) || !holds_speed(here, next, rows, peak) {
+        return None;
     }
-    if steepest > 0.0 { length / steepest } else { 0.0 }
+    let ramp = (peak - x) / (2.0 * up);
+    let brake = (peak - x_end) / (2.0 * down);
+    (ramp < length && brake < length).then(|| (ramp, (length - brake).max(ramp), peak))
+}
+
+/// True if x may stay as it is along the interval.
+fn holds_speed<const R: usize>(here: &Rows<R>, next: &Rows<R>, rows: usize, x: f64) -> bool {
+    [here, next].into_iter().all(|side| side.second.iter().take(rows).all(|q| (q * x).abs() <= 1.0))
 }

@@ -1,7 +1,7 @@
 //! Nodes along the path, and the look-ahead over them.
 //!
-//! The grid walks along the pieces and sets a node wherever the strips (see `limits`) have changed by 2 % or the
-//! speed could have changed by a few percent. The look-ahead then computes for every node, from the end of what is
+//! The grid walks along the pieces and sets a node wherever the strips (see `limits`) have changed by 1 %; on a line
+//! of a Cartesian machine that is at its ends only. The look-ahead then computes for every node, from the end of what is
 //! known backwards, the largest x = ṡ² from which the machine can still follow: the controllable set of TOPP-RA.
 
 use crate::PlanError;
@@ -12,9 +12,7 @@ use crate::planner::{Piece, Planner};
 use pkm_kins::{Kinematics, maths::sqrt};
 
 /// Change of the strips from node to node, in shares of the limits.
-const CHANGE: f64 = 0.02;
-/// Nodes per distance in which the machine reaches full speed.
-const NODES_PER_RAMP: f64 = 40.0;
+const CHANGE: f64 = 0.01;
 /// The speed is held so low that no more than about twice this many nodes are passed in a servo period.
 const NODES_PER_TICK: usize = 64;
 /// Nodes added in one go: bounds the work of a tick.
@@ -48,9 +46,11 @@ pub(crate) struct Node<const R: usize> {
 impl<const R: usize> Node<R> {
     /// Cap on x with the overrides (1 = 100 %).
     pub(crate) fn cap(&self, feed_override: f64, rapid_override: f64) -> f64 {
-        if self.stop {
-            return 0.0;
-        }
+        if self.stop { 0.0 } else { self.speed_cap(feed_override, rapid_override) }
+    }
+
+    /// The same without regard to a stop.
+    pub(crate) fn speed_cap(&self, feed_override: f64, rapid_override: f64) -> f64 {
         let hard = if self.rapid { self.hard * rapid_override * rapid_override } else { self.hard };
         hard.min(self.feed * feed_override * feed_override)
     }
@@ -163,22 +163,18 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             Some(last) => last,
             None => self.sample(piece, self.grid.s)?,
         };
-        // A move that begins and ends at rest needs a node in between to be moving at.
-        let whole = piece.to - piece.from;
-        let most = if matches!(piece.geometry, Geometry::Blend(_)) { whole } else { 0.5 * whole };
-        let mut step = even(remaining, (2.0 * self.grid.step).min(most).min(remaining));
+        let mut step = even(remaining, (2.0 * self.grid.step).min(remaining));
         let period = self.settings.servo_period_s;
         let mut sample = self.sample(piece, self.grid.s + step)?;
         for _ in 0..60 {
             let scales = last.variation(&sample);
-            let ramp = scales.speed / (NODES_PER_RAMP * scales.acceleration);
             let shortest = 0.25 * period * sqrt(scales.speed);
-            if step <= shortest || (scales.change <= CHANGE && step <= ramp) {
+            if step <= shortest || scales.change <= CHANGE {
                 break;
             }
             // Change grows about linearly with the step; never below what is needed.
             let by_change = step * (0.9 * CHANGE / scales.change).clamp(0.1, 1.0);
-            let shorter = even(remaining, by_change.min(ramp).max(0.5 * shortest).min(0.75 * step));
+            let shorter = even(remaining, by_change.max(0.5 * shortest).min(0.75 * step));
             if !(shorter < step) {
                 break;
             }

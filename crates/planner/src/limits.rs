@@ -288,7 +288,7 @@ pub(crate) struct Sample<const R: usize> {
 
 impl<const R: usize> Sample<R> {
     /// How much the strips change between two points, in shares of the limits: the measure that spaces the nodes.
-    /// Also returns x̂ and the largest s̈ there, the scales of speed and acceleration.
+    /// Also returns x̂, the scale of speed there.
     pub(crate) fn variation(&self, other: &Self) -> Scales {
         let mut steepest = 0.0_f64;
         let mut bend = 0.0_f64;
@@ -307,7 +307,7 @@ impl<const R: usize> Sample<R> {
         for ((a1, b1), (a2, b2)) in firsts.zip(seconds) {
             change = change.max((b1 - a1).abs() * acceleration + (b2 - a2).abs() * speed);
         }
-        Scales { change, speed, acceleration }
+        Scales { change, speed }
     }
 }
 
@@ -316,5 +316,4 @@ impl<const R: usize> Sample<R> {
 pub(crate) struct Scales {
     pub(crate) change: f64,
     pub(crate) speed: f64,
-    pub(crate) acceleration: f64,
 }
