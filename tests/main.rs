@@ -3,4 +3,5 @@
 mod kins;
 mod machines;
 mod programs;
+mod run;
 mod support;

@@ -7,11 +7,16 @@
 //! | `moma`      | [`MomaParameters`]                                              |
 //! | `moma-4s`   | [`Moma4sParameters`]                                            |
 //! | `moma-w`    | [`MomaWParameters`]: `[[kinematics.mechanism]]` twice           |
+//! | `hv-mill`   | [`HvMillParameters`]: one mechanism of the HV-Mill              |
+//! | `hv-machine` | [`HvMachineParameters`]: both, `[kinematics.h]`, `[kinematics.v]` |
+//! | `ox-glide`  | [`OxGlideParameters`]                                           |
+//! | `lambda6`   | [`Lambda6Parameters`]                                           |
 
 use crate::source::Findings;
 use pkm_kins::{
-    Axis, AxisSet, Cartesian, GeometryError, Key, Mechanism, Moma, Moma4s, Moma4sParameters, MomaParameters,
-    MomaW, MomaWParameters, Planar, PlanarParameters,
+    Axis, AxisSet, Cartesian, GeometryError, HvMachine, HvMachineParameters, HvMill, HvMillParameters,
+    HvSideParameters, Key, Lambda6, Lambda6Parameters, Mechanism, Moma, Moma4s, Moma4sParameters,
+    MomaParameters, MomaW, MomaWParameters, OxGlide, OxGlideParameters, Planar, PlanarParameters, Spindle,
 };
 use serde::Deserialize;
 use std::ops::Range;
@@ -38,6 +43,10 @@ pub enum Parameters {
     Moma(MomaParameters),
     Moma4s(Moma4sParameters),
     MomaW(MomaWParameters),
+    HvMill(HvMillParameters),
+    HvMachine(HvMachineParameters),
+    OxGlide(OxGlideParameters),
+    Lambda6(Lambda6Parameters),
 }
 
 /// A Cartesian machine as written.
@@ -49,13 +58,14 @@ pub struct CartesianParameters {
 }
 
 /// The `type` names.
-pub const TYPES: [&str; 5] = ["cartesian", "planar", "moma", "moma-4s", "moma-w"];
+pub const TYPES: [&str; 9] =
+    ["cartesian", "planar", "moma", "moma-4s", "moma-w", "hv-mill", "hv-machine", "ox-glide", "lambda6"];
 
 /// Where a key's value stands, so that a geometry error can point at it.
 #[derive(Debug, Clone)]
 struct Place {
-    /// Which `[[kinematics.mechanism]]`, from 0.
-    mechanism: Option<usize>,
+    /// The tables it is in, e.g. `mechanism` `1` or `h` `mechanism`.
+    path: Vec<String>,
     name: String,
     span: Range<usize>,
     entries: Vec<Range<usize>>,
@@ -92,7 +102,8 @@ impl KinematicsFile {
             );
             return None;
         };
-        let places = places(&table, None);
+        let mut places = Vec::new();
+        collect_places(&table, &[], &mut places);
         let kind_span = kind.span();
         let kind = kind.get_ref().as_str().unwrap_or("").to_owned();
         let parameters = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table)));
@@ -102,6 +113,10 @@ impl KinematicsFile {
             "moma" => MomaParameters::deserialize(parameters).map(Parameters::Moma),
             "moma-4s" => Moma4sParameters::deserialize(parameters).map(Parameters::Moma4s),
             "moma-w" => MomaWParameters::deserialize(parameters).map(Parameters::MomaW),
+            "hv-mill" => HvMillParameters::deserialize(parameters).map(Parameters::HvMill),
+            "hv-machine" => HvMachineParameters::deserialize(parameters).map(Parameters::HvMachine),
+            "ox-glide" => OxGlideParameters::deserialize(parameters).map(Parameters::OxGlide),
+            "lambda6" => Lambda6Parameters::deserialize(parameters).map(Parameters::Lambda6),
             _ => {
                 let message = format!("kinematics.type = {kind:?} is not a mechanism");
                 findings.error("machine-mechanism", kind_span, message, &known_types());
@@ -133,6 +148,10 @@ impl KinematicsFile {
             Parameters::Moma(p) => Moma::new(p).map(Mechanism::from),
             Parameters::Moma4s(p) => Moma4s::new(p).map(Mechanism::from),
             Parameters::MomaW(p) => MomaW::new(p).map(Mechanism::from),
+            Parameters::HvMill(p) => HvMill::new(p).map(Mechanism::from),
+            Parameters::HvMachine(p) => HvMachine::new(p).map(Mechanism::from),
+            Parameters::OxGlide(p) => OxGlide::new(p).map(Mechanism::from),
+            Parameters::Lambda6(p) => Lambda6::new(p).map(Mechanism::from),
         };
         built
             .map_err(|error| {
@@ -143,39 +162,56 @@ impl KinematicsFile {
             .ok()
     }
 
-    /// Where a parameter stands. Of two mechanisms, the first that is not valid by itself.
+    /// Where a parameter stands. Of two mechanisms, in the first that is not valid by itself.
     fn place(&self, key: Key) -> Option<Range<usize>> {
-        let faulty = match &self.parameters {
-            Parameters::MomaW(p) => p.mechanism.iter().position(|mechanism| Moma4s::new(mechanism).is_err()),
+        let faulty: Option<&str> = match &self.parameters {
+            Parameters::MomaW(p) => {
+                let index = p.mechanism.iter().position(|mechanism| Moma4s::new(mechanism).is_err());
+                index.map(|index| ["0", "1"][index])
+            }
+            Parameters::HvMachine(p) => {
+                let alone = |spindle, side: &HvSideParameters| HvMillParameters {
+                    spindle,
+                    controlled_axes: 4,
+                    mechanism: side.mechanism,
+                    cr_mm: side.cr_mm,
+                    w0_mm: side.w0_mm,
+                    table_sense: side.table_sense,
+                    head: None,
+                };
+                let faulty = |spindle, side| HvMill::new(&alone(spindle, side)).is_err();
+                faulty(Spindle::H, &p.h).then_some("h").or(faulty(Spindle::V, &p.v).then_some("v"))
+            }
             _ => None,
         };
-        let place = self.places.iter().find(|place| place.name == key.name && place.mechanism == faulty)?;
+        let inside = |place: &&Place| faulty.is_none_or(|name| place.path.iter().any(|table| table == name));
+        let place = self.places.iter().filter(|place| place.name == key.name).find(inside)?;
         let entry = key.index.and_then(|index| place.entries.get(index));
         Some(entry.unwrap_or(&place.span).clone())
     }
 }
 
-/// The places of all keys of the table and of the tables in its arrays.
-fn places(table: &DeTable<'_>, mechanism: Option<usize>) -> Vec<Place> {
-    let mut places = Vec::new();
+/// The places of all keys of the table and of the tables in it and in its arrays.
+fn collect_places(table: &DeTable<'_>, path: &[String], places: &mut Vec<Place>) {
     for (name, value) in table {
+        let name = name.get_ref().clone().into_owned();
         let mut entries = Vec::new();
-        if let DeValue::Array(array) = value.get_ref() {
-            for (index, entry) in array.iter().enumerate() {
-                entries.push(entry.span());
-                if let (DeValue::Table(inner), None) = (entry.get_ref(), mechanism) {
-                    places.extend(self::places(inner, Some(index)));
+        let deeper =
+            |more: &[&str]| [path, &more.iter().map(|&name| name.to_owned()).collect::<Vec<_>>()].concat();
+        match value.get_ref() {
+            DeValue::Table(inner) => collect_places(inner, &deeper(&[&name]), places),
+            DeValue::Array(array) => {
+                for (index, entry) in array.iter().enumerate() {
+                    entries.push(entry.span());
+                    if let DeValue::Table(inner) = entry.get_ref() {
+                        collect_places(inner, &deeper(&[&name, &index.to_string()]), places);
+                    }
                 }
             }
+            _ => {}
         }
-        places.push(Place {
-            mechanism,
-            name: name.get_ref().clone().into_owned(),
-            span: value.span(),
-            entries,
-        });
+        places.push(Place { path: path.to_vec(), name, span: value.span(), entries });
     }
-    places
 }
 
 fn known_types() -> String {

@@ -50,6 +50,14 @@ fn shipped_machines_have_the_coordinates_and_joints_of_the_table() {
         ("moma-d", "XY", "p1 p2"),
         ("moma-4s-u10", "XY", "p1 p2"),
         ("moma-w", "XYZUV", "p1 p2 p3 p4 p5"),
+        ("hv-mill-h3", "XYZB", "p1 p2 p3 p4"),
+        ("hv-mill-h4", "XYZB", "p1 p2 p3 p4"),
+        ("hv-mill-v3", "XYZBC", "p1 p2 p3 p4 p5"),
+        ("hv-mill-v5", "XYZBC", "p1 p2 p3 p4 p5"),
+        ("hv-mill-6", "XYZBCUVW", "H1 H2 V1 V2 carriage table"),
+        ("hv-mill-7", "XYZBCUVW", "H1 H2 V1 V2 carriage table head"),
+        ("ox-glide-o", "XYZ", "AB CD Z"),
+        ("lambda6", "XYZABC", "l1 l2 l3 l4 l5 l6"),
         ("xyz", "XYZ", "x y z"),
         ("xyzabc", "XYZABC", "x y z a b c"),
     ] {
@@ -186,6 +194,21 @@ fn a_fault_in_the_second_mechanism_is_shown_there() {
     assert_eq!(
         (finding.code.as_str(), finding.line, finding.column),
         ("machine-geometry", line, 14),
+        "{finding:?}"
+    );
+}
+
+#[test]
+fn a_fault_in_a_nested_table_is_shown_there() {
+    let text = shipped::text("hv-mill-7").unwrap();
+    let vertical = text.find("[kinematics.v.mechanism]").unwrap();
+    let at = vertical + text[vertical..].find("l_mm = [195, 195]").unwrap();
+    let text = format!("{}l_mm = [0, 195]{}", &text[..at], &text[at + "l_mm = [195, 195]".len()..]);
+    let finding = refusal(Machine::parse("hv.toml", &text, &[]));
+    let line = text[..at].matches('\n').count() as u32 + 1;
+    assert_eq!(
+        (finding.code.as_str(), finding.line, finding.column),
+        ("machine-geometry", line, 9),
         "{finding:?}"
     );
 }

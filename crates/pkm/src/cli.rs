@@ -1,6 +1,7 @@
 //! The command line: one definition, from which help, man page and completions come.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
 
 /// Motion control for parallel-kinematic machines: G-code in, verified motion and step pulses out.
 ///
@@ -38,6 +39,10 @@ pub(crate) enum Format {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Run a program on the simulated machine: summary, trace, step pulses
+    Run(Run),
+    /// Everything that can be said before cutting, without producing pulses
+    Check(Check),
     /// Pose to joints and back, JSON lines in and out
     #[command(subcommand)]
     Kins(Kins),
@@ -54,6 +59,8 @@ impl Command {
             Self::Kins(Kins::Inverse(arguments) | Kins::Forward(arguments) | Kins::Jacobian(arguments)) => {
                 &arguments.machine.set
             }
+            Self::Run(arguments) => &arguments.program.machine.set,
+            Self::Check(arguments) => &arguments.program.machine.set,
             Self::Machines(_) | Self::Generate(_) => &[],
         }
     }
@@ -68,6 +75,59 @@ pub(crate) struct MachineArgs {
     /// Override a key of the machine file, e.g. 'joint.*.max_velocity_mm_s=100'; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
+}
+
+/// A program on a machine.
+#[derive(Debug, Args)]
+pub(crate) struct ProgramArgs {
+    /// G-code program; `-` is standard input
+    pub program: PathBuf,
+    #[command(flatten)]
+    pub machine: MachineArgs,
+    /// Where the machine stands when the program begins, e.g. "X0 Y-260" (mm, degrees); default: its home pose
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pub start: Option<String>,
+    /// Skip the lines that begin with `/`
+    #[arg(long)]
+    pub block_delete: bool,
+    /// How the result is printed
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Run {
+    #[command(flatten)]
+    pub program: ProgramArgs,
+    /// Write steps.vcd, trace.csv and summary.json into this folder
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Do not write trace.csv
+    #[arg(long)]
+    pub no_trace: bool,
+    /// Rows of trace.csv per servo period
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub trace_substeps: u32,
+    /// Feed override, percent of the programmed feed
+    #[arg(long, value_name = "PERCENT", default_value_t = 100.0, value_parser = percent)]
+    pub feed_override: f64,
+    /// End the run, not completed, after so many servo periods
+    #[arg(long, value_name = "N", default_value_t = 100_000_000)]
+    pub max_ticks: u64,
+}
+
+/// A feed override: above 0, at most 200 %.
+fn percent(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(percent) if percent > 0.0 && percent <= 200.0 => Ok(percent),
+        _ => Err("a number above 0, at most 200".into()),
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Check {
+    #[command(flatten)]
+    pub program: ProgramArgs,
 }
 
 #[derive(Debug, Subcommand)]

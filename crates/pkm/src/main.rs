@@ -2,7 +2,9 @@
 
 mod cli;
 mod commands;
+mod interrupt;
 mod outcome;
+mod output;
 mod render;
 
 use clap::Parser;
@@ -12,6 +14,8 @@ fn main() -> ExitCode {
     let cli = cli::Cli::parse();
     let messages = render::diagnostics::Messages::new(cli.color, cli.command.overrides());
     let result = match &cli.command {
+        cli::Command::Run(arguments) => commands::run::run(arguments, &messages),
+        cli::Command::Check(arguments) => commands::check::run(arguments, &messages),
         cli::Command::Kins(command) => commands::kins::run(command),
         cli::Command::Machines(arguments) => commands::machines::run(arguments),
         cli::Command::Generate(arguments) => commands::generate::run(arguments),

@@ -14,6 +14,8 @@ pub(crate) enum Outcome {
     No,
     /// The question could not be asked.
     CouldNot,
+    /// Ended by Ctrl-C.
+    Interrupted,
 }
 
 impl From<Outcome> for ExitCode {
@@ -22,6 +24,7 @@ impl From<Outcome> for ExitCode {
             Outcome::Clean => 0,
             Outcome::No => 1,
             Outcome::CouldNot => 2,
+            Outcome::Interrupted => crate::interrupt::STATUS,
         })
     }
 }
@@ -74,6 +77,12 @@ impl From<io::Error> for Failure {
                 "free space or choose another place",
             ),
         }
+    }
+}
+
+impl From<Diagnostic> for Failure {
+    fn from(diagnostic: Diagnostic) -> Self {
+        Self::CouldNot(vec![diagnostic])
     }
 }
 

@@ -1,5 +1,8 @@
 //! One file per subcommand.
 
+pub(crate) mod check;
 pub(crate) mod generate;
 pub(crate) mod kins;
 pub(crate) mod machines;
+pub(crate) mod program;
+pub(crate) mod run;

@@ -10,7 +10,6 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, IsTerminal, Read, Write, stderr};
 
 /// A diagnostic as scripts read it.
-#[allow(dead_code)] // `run` and `check` print it
 #[derive(Debug, Serialize)]
 pub(crate) struct Json<'a> {
     code: &'a str,

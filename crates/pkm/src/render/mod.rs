@@ -1,3 +1,4 @@
 //! How results and messages look.
 
 pub(crate) mod diagnostics;
+pub(crate) mod summary;

@@ -1,0 +1,78 @@
+//! `pkm check`: everything that can be said before cutting.
+
+use crate::cli::{Check, Format};
+use crate::commands::program::{Job, Refused};
+use crate::outcome::{Failure, Outcome};
+use crate::render::diagnostics::{Json, Messages};
+use pkm_canon::diagnostic::Severity;
+use serde::Serialize;
+use std::io::{Write, stdout};
+
+/// The answer as scripts read it.
+#[derive(Serialize)]
+struct Answer<'a> {
+    schema: u32,
+    program: String,
+    machine: &'a str,
+    ok: bool,
+    blocks: u64,
+    moves: u64,
+    diagnostics: Vec<Json<'a>>,
+}
+
+pub(crate) fn run(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
+    let answer = check(arguments, messages);
+    match (answer, arguments.program.format) {
+        (Err(Failure::CouldNot(diagnostics)), Format::Json) => {
+            serde_json::to_writer(stdout().lock(), &Refused::new(&arguments.program, &diagnostics))
+                .map_err(std::io::Error::from)?;
+            writeln!(stdout().lock())?;
+            Ok(Outcome::CouldNot)
+        }
+        (answer, _) => answer,
+    }
+}
+
+fn check(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
+    let job = Job::new(&arguments.program)?;
+    let checked = pkm_run::check(&job.program, &job.machine, &job.options)?;
+    let mut out = stdout().lock();
+    match arguments.program.format {
+        Format::Json => {
+            let answer = Answer {
+                schema: pkm_run::SCHEMA,
+                program: job.program.name(),
+                machine: &job.machine.name,
+                ok: !checked.has_errors(),
+                blocks: checked.blocks,
+                moves: checked.moves,
+                diagnostics: checked.diagnostics.iter().map(Json::from).collect(),
+            };
+            writeln!(out, "{}", serde_json::to_string(&answer).map_err(std::io::Error::from)?)?;
+        }
+        Format::Text => {
+            messages.print(&checked.diagnostics);
+            let count = |severity| checked.diagnostics.iter().filter(|d| d.severity == severity).count();
+            writeln!(
+                out,
+                "{}: {} blocks, {} moves on {}: {}, {}",
+                job.program.name(),
+                checked.blocks,
+                checked.moves,
+                job.machine.name,
+                plural(count(Severity::Error), "error"),
+                plural(count(Severity::Warning), "warning"),
+            )?;
+        }
+    }
+    Ok(if checked.has_errors() { Outcome::No } else { Outcome::Clean })
+}
+
+/// `no errors`, `1 error`, `2 errors`.
+fn plural(count: usize, word: &str) -> String {
+    match count {
+        0 => format!("no {word}s"),
+        1 => format!("1 {word}"),
+        _ => format!("{count} {word}s"),
+    }
+}

@@ -1,0 +1,137 @@
+//! `pkm run`: a program on the simulated machine, with its files.
+
+use crate::cli::{Format, Run};
+use crate::commands::program::{Job, Refused};
+use crate::interrupt;
+use crate::outcome::{Failure, Outcome};
+use crate::output::{self, Folder, Pending};
+use crate::render::diagnostics::Messages;
+use crate::render::summary;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use pkm_hal_sim::{Observer, Simulation, TickReport, TraceWriter, VcdWriter};
+use pkm_run::{Options, Progress, Summary};
+use pkm_stepgen::Edge;
+use std::io::{IsTerminal, Write, stderr, stdout};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// The files that see the run.
+#[derive(Default)]
+struct Files {
+    vcd: Option<VcdWriter<Pending>>,
+    trace: Option<TraceWriter<Pending>>,
+}
+
+impl Observer for Files {
+    fn wants_edges(&self) -> bool {
+        self.vcd.is_some()
+    }
+
+    fn edge(&mut self, edge: &Edge) {
+        if let Some(vcd) = &mut self.vcd {
+            vcd.edge(edge);
+        }
+    }
+
+    fn tick(&mut self, report: &TickReport<'_>) {
+        if let Some(vcd) = &mut self.vcd {
+            vcd.tick(report);
+        }
+        if let Some(trace) = &mut self.trace {
+            trace.tick(report);
+        }
+    }
+}
+
+pub(crate) fn run(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
+    match (drive(arguments, messages), arguments.program.format) {
+        (Err(Failure::CouldNot(diagnostics)), Format::Json) => {
+            let refused = Refused::new(&arguments.program, &diagnostics);
+            writeln!(stdout().lock(), "{}", serde_json::to_string(&refused).map_err(std::io::Error::from)?)?;
+            Ok(Outcome::CouldNot)
+        }
+        (outcome, _) => outcome,
+    }
+}
+
+fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
+    let Job { program, machine, options } = Job::new(&arguments.program)?;
+    let options = Options {
+        feed_override: arguments.feed_override / 100.0,
+        substeps: arguments.trace_substeps,
+        max_ticks: arguments.max_ticks,
+        ..options
+    };
+    // The files are begun first: a folder that cannot be written to is told before the work.
+    let folder = arguments.out.as_deref().map(Folder::new).transpose()?;
+    let create = |name| folder.as_ref().map(|folder| folder.create(name)).transpose();
+    let steps = create("steps.vcd")?;
+    let rows = if arguments.no_trace { None } else { create("trace.csv")? };
+    let summary_file = create("summary.json")?;
+
+    let interrupted = interrupt::flag();
+    let write_failed = folder.as_ref().map(Folder::failed);
+    let bar = progress_bar(arguments);
+    let period_s = machine.servo_period_ns as f64 / 1e9;
+    let outputs = |simulation: &Simulation| Files {
+        vcd: steps.map(|file| VcdWriter::new(file, simulation)),
+        trace: rows.map(|file| TraceWriter::new(file, simulation)),
+    };
+    let progress = |progress: &Progress| {
+        bar.set_position(u64::from(progress.line));
+        bar.set_message(format!("{:.1} s", progress.ticks as f64 * period_s));
+        let stop = interrupted.load(Ordering::Relaxed)
+            || write_failed.as_ref().is_some_and(|failed| failed.load(Ordering::Relaxed));
+        if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let result = pkm_run::run(&program, &machine, &options, outputs, progress);
+    bar.finish_and_clear();
+    let (summary, files) = result?;
+    if let (Some(folder), Some(files), Some(summary_file)) = (folder, files, summary_file) {
+        save(folder, files, summary_file, &summary)?;
+    }
+    let mut out = stdout().lock();
+    match arguments.program.format {
+        Format::Json => writeln!(out, "{}", summary::json(&summary)?)?,
+        Format::Text => {
+            messages.print(&summary.diagnostics);
+            out.write_all(summary::text(&summary).as_bytes())?;
+        }
+    }
+    Ok(if interrupted.load(Ordering::Relaxed) && !summary.completed {
+        Outcome::Interrupted
+    } else if summary.completed {
+        Outcome::Clean
+    } else {
+        Outcome::No
+    })
+}
+
+/// Ends all files and puts them in place; the first error of any of them is the answer.
+fn save(folder: Folder, files: Files, mut summary_file: Pending, summary: &Summary) -> Result<(), Failure> {
+    let mut done = Vec::new();
+    let told = |name: &str, error: &std::io::Error| output::failure(&PathBuf::from(name), error);
+    if let Some(vcd) = files.vcd {
+        done.push(vcd.finish().map_err(|error| told("steps.vcd", &error))?);
+    }
+    if let Some(trace) = files.trace {
+        done.push(trace.finish().map_err(|error| told("trace.csv", &error))?);
+    }
+    writeln!(summary_file, "{}", summary::json(summary)?).map_err(|error| told("summary.json", &error))?;
+    done.push(summary_file);
+    folder.commit(done)
+}
+
+/// Lines of the program, on a terminal; nothing elsewhere.
+fn progress_bar(arguments: &Run) -> ProgressBar {
+    if !stderr().is_terminal() {
+        return ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+    }
+    let bar = ProgressBar::new_spinner();
+    let style = ProgressStyle::with_template("{spinner} {prefix} line {pos}, {msg} of machine time")
+        .unwrap_or_else(|_| ProgressStyle::default_spinner());
+    bar.set_style(style);
+    bar.set_prefix(arguments.program.program.display().to_string());
+    bar
+}

@@ -1,0 +1,96 @@
+//! Output files: each appears whole or not at all (promise P7).
+//!
+//! A file is written under another name in the same folder, synced, then renamed; the folder is synced after it. Nothing
+//! is renamed before everything is written and synced, so a full disk leaves all old files as they were.
+
+use crate::outcome::Failure;
+use atomic_write_file::AtomicWriteFile;
+use std::fs::{File, create_dir_all};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A folder for output files.
+#[derive(Debug)]
+pub(crate) struct Folder {
+    path: PathBuf,
+    failed: Arc<AtomicBool>,
+}
+
+/// A file that is being written.
+#[derive(Debug)]
+pub(crate) struct Pending {
+    path: PathBuf,
+    file: BufWriter<AtomicWriteFile>,
+    failed: Arc<AtomicBool>,
+}
+
+impl Folder {
+    /// The folder at `path`, made if it is not there.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub(crate) fn new(path: &Path) -> Result<Self, Failure> {
+        create_dir_all(path).map_err(|error| failure(path, &error))?;
+        Ok(Self { path: path.to_owned(), failed: Arc::new(AtomicBool::new(false)) })
+    }
+
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// It cannot be made.
+    pub(crate) fn create(&self, name: &str) -> Result<Pending, Failure> {
+        let path = self.path.join(name);
+        let file = AtomicWriteFile::open(&path).map_err(|error| failure(&path, &error))?;
+        Ok(Pending { path, file: BufWriter::new(file), failed: Arc::clone(&self.failed) })
+    }
+
+    /// Set as soon as writing to any file of the folder has failed.
+    pub(crate) fn failed(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.failed)
+    }
+
+    /// Puts all files in place of the old ones.
+    ///
+    /// # Errors
+    /// A file cannot be written to the end or synced: then no file has changed. Or it cannot be renamed.
+    pub(crate) fn commit(self, files: Vec<Pending>) -> Result<(), Failure> {
+        let mut ready = Vec::new();
+        for Pending { path, file, .. } in files {
+            let file = file.into_inner().map_err(|error| failure(&path, error.error()))?;
+            file.sync_all().map_err(|error| failure(&path, &error))?;
+            ready.push((path, file));
+        }
+        for (path, file) in ready {
+            file.commit().map_err(|error| failure(&path, &error))?;
+        }
+        File::open(&self.path)
+            .and_then(|folder| folder.sync_all())
+            .map_err(|error| failure(&self.path, &error))
+    }
+}
+
+impl Write for Pending {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.file.write(bytes);
+        if written.is_err() {
+            self.failed.store(true, Ordering::Relaxed);
+        }
+        written
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// What the system said about a path.
+pub(crate) fn failure(path: &Path, error: &io::Error) -> Failure {
+    Failure::could_not(
+        "output",
+        &path.display().to_string(),
+        format!("cannot write {}: {error}", path.display()),
+        "free space or choose another folder with --out; files that were there are as they were",
+    )
+}
