@@ -38,7 +38,6 @@ fn main() -> std::process::ExitCode {
         eprintln!("{}", String::from_utf8_lossy(line));
         false
     });
-    drop(writer);
     let _ = output.flush();
     std::process::ExitCode::from(u8::from(failed))
 }

@@ -148,6 +148,14 @@ impl Block {
         MGroup::of(number).is_some_and(|group| self.m(group) == Some(number))
     }
 
+    /// True if the block waits for time, a person or an input.
+    pub(crate) fn has_pause(&self) -> bool {
+        self.g(GGroup::NonModal) == Some(G4)
+            || self.m(MGroup::Stop).is_some()
+            || self.m(MGroup::Tool).is_some()
+            || self.has_m(66)
+    }
+
     /// The whole block.
     pub(crate) fn span(&self) -> Span {
         self.whole

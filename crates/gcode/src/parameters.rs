@@ -40,15 +40,63 @@ pub(crate) const fn is_persistent(index: i32) -> bool {
         || (index >= 5241 && index <= 5390 && matches!((index - 5221) % 20, 0..=9))
 }
 
+/// Arguments of a sub: #1 to #30.
+pub(crate) const ARGUMENTS: usize = 30;
+
 /// All parameters of a program.
 #[derive(Debug, Clone)]
 pub struct Parameters {
     numbered: [f64; COUNT],
     #[cfg(feature = "alloc")]
-    globals: BTreeMap<Box<[u8]>, f64>,
-    /// One map per call level; the last is the present one.
-    #[cfg(feature = "alloc")]
-    locals: Vec<BTreeMap<Box<[u8]>, f64>>,
+    named: Named,
+}
+
+/// Named parameters. A name is stored once, so that using it again allocates nothing.
+#[cfg(feature = "alloc")]
+#[derive(Debug, Clone, Default)]
+struct Named {
+    names: BTreeMap<Box<[u8]>, u32>,
+    /// Names that begin with `_`.
+    globals: BTreeMap<u32, f64>,
+    /// Names of all open calls, the present one's last.
+    locals: Vec<(u32, f64)>,
+    /// Where the names of each call begin in `locals`; the main program's begin at 0.
+    frames: Vec<usize>,
+}
+
+#[cfg(feature = "alloc")]
+impl Named {
+    fn present(&self) -> &[(u32, f64)] {
+        &self.locals[self.frames.last().copied().unwrap_or(0)..]
+    }
+
+    fn get(&self, name: &[u8]) -> Option<f64> {
+        let id = self.names.get(name)?;
+        if name.first() == Some(&b'_') {
+            return self.globals.get(id).copied();
+        }
+        self.present().iter().find(|(known, _)| known == id).map(|(_, value)| *value)
+    }
+
+    fn set(&mut self, name: &[u8], value: f64) {
+        let id = match self.names.get(name) {
+            Some(id) => *id,
+            None => {
+                let id = self.names.len() as u32;
+                self.names.insert(name.into(), id);
+                id
+            }
+        };
+        if name.first() == Some(&b'_') {
+            self.globals.insert(id, value);
+            return;
+        }
+        let first = self.frames.last().copied().unwrap_or(0);
+        match self.locals[first..].iter_mut().find(|(known, _)| *known == id) {
+            Some(place) => place.1 = value,
+            None => self.locals.push((id, value)),
+        }
+    }
 }
 
 impl Default for Parameters {
@@ -59,9 +107,7 @@ impl Default for Parameters {
         Self {
             numbered,
             #[cfg(feature = "alloc")]
-            globals: BTreeMap::new(),
-            #[cfg(feature = "alloc")]
-            locals: Vec::from([BTreeMap::new()]),
+            named: Named::default(),
         }
     }
 }
@@ -90,11 +136,10 @@ impl Parameters {
         }
     }
 
-    /// `#<name>` as the program sees it: names that begin with `_` are global.
+    /// `#<name>` as the program sees it: names that begin with `_` are global, others belong to the present sub.
     #[cfg(feature = "alloc")]
     pub fn named(&self, name: &[u8]) -> Option<f64> {
-        let map = if name.first() == Some(&b'_') { &self.globals } else { self.locals.last()? };
-        map.get(name).copied()
+        self.named.get(name)
     }
 
     #[cfg(not(feature = "alloc"))]
@@ -105,15 +150,7 @@ impl Parameters {
     /// Sets or creates `#<name>`.
     #[cfg(feature = "alloc")]
     pub(crate) fn set_named(&mut self, name: &[u8], value: f64) -> Result<(), ErrorKind> {
-        let map = if name.first() == Some(&b'_') {
-            &mut self.globals
-        } else {
-            self.locals.last_mut().ok_or(ErrorKind::ParamNoMemory)?
-        };
-        match map.get_mut(name) {
-            Some(place) => *place = value,
-            None => drop(map.insert(name.into(), value)),
-        }
+        self.named.set(name, value);
         Ok(())
     }
 
@@ -121,18 +158,28 @@ impl Parameters {
     pub(crate) fn set_named(&mut self, _: &[u8], _: f64) -> Result<(), ErrorKind> {
         Err(ErrorKind::ParamNoMemory)
     }
+}
+
+#[cfg(feature = "alloc")]
+impl Parameters {
+    /// #1 to #30.
+    pub(crate) fn arguments(&self) -> [f64; ARGUMENTS] {
+        core::array::from_fn(|i| self.numbered[i + 1])
+    }
+
+    pub(crate) fn set_arguments(&mut self, values: &[f64; ARGUMENTS]) {
+        self.numbered[1..=ARGUMENTS].copy_from_slice(values);
+    }
 
     /// A sub begins: its own names.
-    #[cfg(feature = "alloc")]
     pub(crate) fn enter(&mut self) {
-        self.locals.push(BTreeMap::new());
+        self.named.frames.push(self.named.locals.len());
     }
 
     /// A sub ends: its names are forgotten.
-    #[cfg(feature = "alloc")]
     pub(crate) fn leave(&mut self) {
-        if self.locals.len() > 1 {
-            self.locals.pop();
+        if let Some(first) = self.named.frames.pop() {
+            self.named.locals.truncate(first);
         }
     }
 }

@@ -5,6 +5,8 @@ mod check;
 mod comments;
 mod end;
 mod execute;
+#[cfg(feature = "alloc")]
+mod flow;
 mod modes;
 mod motion;
 mod offsets;
@@ -16,7 +18,7 @@ use crate::error::{Error, ErrorKind};
 use crate::line::Line;
 use crate::parameters::{self, Parameters};
 use crate::settings::{Dialect, Settings};
-use crate::source::LineSource;
+use crate::source::{LineSource, Place};
 use crate::tool_table::ToolTable;
 use pkm_canon::{Canon, CanonSink, Position, Span};
 use state::State;
@@ -67,6 +69,10 @@ pub struct Interpreter {
     block: Block,
     phase: Phase,
     begun: bool,
+    /// Blocks since the last motion, dwell or input.
+    idle_blocks: u64,
+    #[cfg(feature = "alloc")]
+    flow: flow::Flow,
 }
 
 impl Interpreter {
@@ -78,6 +84,9 @@ impl Interpreter {
             block: Block::new(),
             phase: Phase::New,
             begun: false,
+            idle_blocks: 0,
+            #[cfg(feature = "alloc")]
+            flow: flow::Flow::default(),
         }
     }
 
@@ -201,7 +210,7 @@ impl Interpreter {
                 return Err(Error { kind: ErrorKind::FileOpen { cause }, span });
             }
         }
-        self.execute_line(sink)
+        self.execute_line(place, source, sink)
     }
 
     /// pkm's own dialect accepts a byte order mark before the first block.
@@ -219,11 +228,32 @@ impl Interpreter {
             _ => ErrorKind::FileEmpty,
         };
         self.phase = Phase::Ended;
+        #[cfg(feature = "alloc")]
+        if let Some(error) = self.flow.unanswered() {
+            return error;
+        }
         let end = self.line.raw().len();
         Error { kind, span: self.line.span(end, end) }
     }
 
-    fn execute_line(&mut self, sink: &mut dyn CanonSink) -> Result<Status, Error> {
+    /// A loop that does nothing for too long is taken for endless.
+    fn count_idle(&mut self) -> Result<(), Error> {
+        self.idle_blocks += 1;
+        let limit = self.state.settings.max_idle_blocks;
+        if limit > 0 && self.idle_blocks > limit {
+            self.phase = Phase::Ended;
+            let kind = ErrorKind::EndlessLoop { blocks: limit };
+            return Err(Error { kind, span: self.line.whole() });
+        }
+        Ok(())
+    }
+
+    fn execute_line(
+        &mut self,
+        here: Place,
+        source: &mut dyn LineSource,
+        sink: &mut dyn CanonSink,
+    ) -> Result<Status, Error> {
         let trimmed = self.line.raw().trim_ascii_start();
         let framed = self.phase == Phase::Running { framed: true };
         match trimmed {
@@ -231,19 +261,35 @@ impl Interpreter {
             b"%" if framed => {
                 self.phase = Phase::Ended;
                 Out { sink, span: self.line.whole() }.emit(Canon::Finish);
+                #[cfg(feature = "alloc")]
+                if let Some(error) = self.flow.unclosed() {
+                    return Err(error);
+                }
                 return Ok(Status::Ended);
             }
             [b'/', ..] if self.state.settings.block_delete => return Ok(Status::Running),
             _ => {}
         }
         self.line.prepare()?;
+        self.count_idle()?;
         let start = self.line.skip_number()?;
         self.state.source_line = self.line.number;
-        self.refuse_o_word(start)?;
+        if self.line.code().get(start) == Some(&b'o') {
+            return self.control(start, here, source);
+        }
+        if self.is_skipping() {
+            return Ok(Status::Running);
+        }
         self.block.read(&self.line, start, &self.state, &self.state.reader())?;
         self.state.complete(&mut self.block)?;
+        if self.block.motion.is_some() || self.block.has_pause() {
+            self.idle_blocks = 0;
+        }
         let mut out = Out { sink, span: self.block.span() };
         self.state.store_settings(&self.block, &self.line)?;
+        if let Some(status) = self.program_call(source, &mut out)? {
+            return Ok(status);
+        }
         let status = self.state.execute(&mut self.block, &self.line, &mut out)?;
         if status == Status::Ended {
             if framed {
@@ -254,11 +300,33 @@ impl Interpreter {
         Ok(status)
     }
 
-    fn refuse_o_word(&self, start: usize) -> Result<(), Error> {
-        if self.line.code().get(start) == Some(&b'o') {
-            let span = self.line.code_span(start, self.line.code().len());
-            return Err(Error { kind: ErrorKind::OUnknown, span });
+    #[cfg(feature = "alloc")]
+    fn control(&mut self, start: usize, here: Place, source: &mut dyn LineSource) -> Result<Status, Error> {
+        self.o_word(start, here, source).map(|()| Status::Running)
+    }
+
+    #[cfg(feature = "alloc")]
+    fn is_skipping(&self) -> bool {
+        self.flow.is_skipping()
+    }
+}
+
+/// Without memory there are no o-words; each is refused by name.
+#[cfg(not(feature = "alloc"))]
+impl Interpreter {
+    fn control(&mut self, start: usize, _: Place, _: &mut dyn LineSource) -> Result<Status, Error> {
+        let span = self.line.code_span(start, self.line.code().len());
+        Err(Error { kind: ErrorKind::ONoMemory, span })
+    }
+
+    fn is_skipping(&self) -> bool {
+        false
+    }
+
+    fn program_call(&self, _: &mut dyn LineSource, _: &mut Out<'_>) -> Result<Option<Status>, Error> {
+        match self.block.has_m(98) {
+            true => Err(Error { kind: ErrorKind::ONoMemory, span: self.block.span() }),
+            false => Ok(None),
         }
-        Ok(())
     }
 }

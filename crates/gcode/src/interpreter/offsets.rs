@@ -99,10 +99,18 @@ impl State {
         self.parameters.set_nine(first, &stored);
         self.parameters.set(first + 9, rotation);
         if active {
-            self.keep_machine_point(|state| {
+            let change = |state: &mut Self| {
                 state.g5x = offset;
                 state.rotation_deg = rotation;
-            });
+            };
+            if self.settings.dialect == Dialect::Pkm {
+                self.keep_machine_point(change);
+            } else {
+                // LinuxCNC turns the position without its G92 offset: the machine point is lost if both are used.
+                let g92 = core::mem::take(&mut self.g92);
+                self.keep_machine_point(change);
+                self.g92 = g92;
+            }
             out.emit(self.g5x_command());
             out.emit(Canon::SetXyRotation(self.rotation_deg));
         } else {
@@ -155,8 +163,9 @@ impl State {
     /// LinuxCNC does not take the tool offset of A B C off machine coordinates (G28, G30, G53); pkm does.
     pub(crate) fn keep_rotary_tool_offset(&self, machine: &mut [f64; 9]) {
         if self.settings.dialect != Dialect::Pkm {
-            for axis in 3..6 {
-                machine[axis] += self.tool_offset[axis];
+            let rotary = 3..6;
+            for (coordinate, offset) in machine[rotary.clone()].iter_mut().zip(&self.tool_offset[rotary]) {
+                *coordinate += offset;
             }
         }
     }

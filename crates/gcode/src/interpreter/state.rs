@@ -30,6 +30,12 @@ pub(crate) struct State {
     pub(crate) rotation_deg: f64,
     /// Slot of the tool in the spindle; 0 = none.
     pub(crate) loaded_slot: i32,
+    /// Open calls.
+    pub(crate) call_level: u32,
+    /// What the last return gave; `None` = nothing.
+    pub(crate) return_value: Option<f64>,
+    /// Undefined named parameters read 0 (LinuxCNC, while it passes over a definition).
+    pub(crate) unknown_names_are_zero: bool,
     /// Line of the block being read.
     pub(crate) source_line: u32,
 }
@@ -48,6 +54,9 @@ impl State {
             rotation_deg: 0.0,
             // rs274 begins with slot 1 in force and an empty spindle.
             loaded_slot: i32::from(settings.imitates_rs274),
+            call_level: 0,
+            return_value: None,
+            unknown_names_are_zero: false,
             source_line: 0,
         }
     }
@@ -121,8 +130,12 @@ impl State {
             LengthUnit::Mm => MM_PER_INCH,
         };
         self.modal.units = units;
-        for values in [&mut self.position, &mut self.g5x, &mut self.g92, &mut self.tool_offset] {
+        for values in [&mut self.position, &mut self.g5x, &mut self.g92] {
             scale_lengths(values, factor);
+        }
+        // The interpreter reads the tool offset back from the machine; rs274's answers with the old number.
+        if !self.settings.imitates_rs274 {
+            scale_lengths(&mut self.tool_offset, factor);
         }
     }
 
@@ -158,6 +171,29 @@ impl State {
             }
         }
         Ok(())
+    }
+
+    #[cfg(feature = "alloc")]
+    pub(crate) fn enter_sub(&mut self, arguments: Option<[f64; parameters::ARGUMENTS]>) {
+        self.call_level += 1;
+        self.parameters.enter();
+        if let Some(arguments) = arguments {
+            self.parameters.set_arguments(&arguments);
+        }
+    }
+
+    #[cfg(feature = "alloc")]
+    pub(crate) fn leave_sub(&mut self, arguments: Option<[f64; parameters::ARGUMENTS]>) {
+        self.call_level = self.call_level.saturating_sub(1);
+        self.parameters.leave();
+        if let Some(arguments) = arguments {
+            self.parameters.set_arguments(&arguments);
+        }
+    }
+
+    #[cfg(feature = "alloc")]
+    pub(crate) fn set_return_value(&mut self, value: Option<f64>) {
+        self.return_value = value;
     }
 
     /// Value of a predefined named parameter.
@@ -217,7 +253,10 @@ impl State {
             b"_current_pocket" => self.tools.get(0).map(|tool| tool.pocket.into()),
             b"_selected_tool" => Some(modal.selected_tool.into()),
             b"_selected_pocket" => Some(modal.selected_slot.into()),
-            b"_task" | b"_call_level" | b"_remap_level" => Some(0.0),
+            b"_task" | b"_remap_level" => Some(0.0),
+            b"_call_level" => Some(self.call_level.into()),
+            b"_value" => Some(self.return_value.unwrap_or(0.0)),
+            b"_value_returned" => flag(self.return_value.is_some()),
             _ => {
                 let axis = |letter: &u8| b"xyzabcuvw".iter().position(|l| l == letter);
                 match name {
@@ -264,7 +303,7 @@ impl Scope for State {
         {
             return Some(value);
         }
-        self.parameters.named(name)
+        self.parameters.named(name).or_else(|| self.unknown_names_are_zero.then_some(0.0))
     }
 
     fn tolerance(&self) -> Tolerance {

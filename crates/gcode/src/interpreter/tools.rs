@@ -123,6 +123,10 @@ impl State {
             out.emit(Canon::ReloadTooldata);
             return Ok(());
         }
+        if !block.has_axis() && !block.has_any(b"RIJQ") {
+            let code = crate::error::Code(G10);
+            return Err(block.g_error(GGroup::NonModal, ErrorKind::OffsetEmpty { code }));
+        }
         let p = block.get(b'P').unwrap_or(-1.0);
         let number = maths::round(p);
         let range = ErrorKind::OffsetP { value: p, first: 1, last: i32::MAX };

@@ -1,5 +1,6 @@
 //! Seeded random programs: plausible ones, and the same with one thing spoiled.
 
+use pkm_kins::maths;
 use std::fmt::Write;
 
 /// splitmix64 (Steele, Lea, Flood 2014).
@@ -27,6 +28,9 @@ impl Random {
         choices[self.below(choices.len() as u64) as usize]
     }
 }
+
+/// What a spoiled byte becomes.
+const SPOILS: &[u8] = b"GXYZIJKRPFM#[]()0123456789.-+*/=<> \n%;o";
 
 /// One random program.
 pub struct Generator {
@@ -98,7 +102,7 @@ impl Generator {
         for _ in 0..1 + self.random.below(2) {
             let at = self.random.below(bytes.len() as u64) as usize;
             match self.random.below(3) {
-                0 => bytes[at] = b"GXYZIJKRPFM#[]()0123456789.-+*/=<> \n%;o"[self.random.below(40) as usize],
+                0 => bytes[at] = SPOILS[self.random.below(SPOILS.len() as u64) as usize],
                 1 => bytes.insert(at, bytes[at]),
                 _ => drop(bytes.remove(at)),
             }
@@ -203,13 +207,13 @@ impl Generator {
         let _ = write!(self.text, "{incremental}");
         if self.random.chance(40) {
             let (dx, dy) = (self.number(), self.number());
-            let radius = (dx.hypot(dy) / 2.0 + self.random.below(30) as f64).ceil();
+            let radius = (maths::hypot(dx, dy) / 2.0 + self.random.below(30) as f64).ceil();
             let sign = if self.random.chance(30) { "-" } else { "" };
             let _ = write!(self.text, "{}{dx} {}{dy} R{sign}{radius} ", letters[0], letters[1]);
         } else {
             let (i, j) = (self.number(), self.number());
             let angle = (self.random.below(360) as f64).to_radians();
-            let (sin, cos) = pkm_kins_sin_cos(angle);
+            let (sin, cos) = (maths::sin(angle), maths::cos(angle));
             // From the start (0, 0) about (i, j) by `angle`.
             let (dx, dy) = (i - (i * cos - j * sin), j - (i * sin + j * cos));
             let _ = write!(self.text, "{}{dx:.5} {}{dy:.5} ", letters[0], letters[1]);
@@ -551,7 +555,7 @@ impl Generator {
                 2 | 3 => {
                     let code = self.random.pick(&["G2", "G3"]);
                     let (dx, dy) = (self.number() / 2.0, self.number() / 2.0);
-                    let radius = (dx.hypot(dy) / 2.0 + self.random.below(20) as f64 + 2.0).ceil();
+                    let radius = (maths::hypot(dx, dy) / 2.0 + self.random.below(20) as f64 + 2.0).ceil();
                     (x, y) = (x + dx, y + dy);
                     let _ = writeln!(self.text, "{code} X{x:.4} Y{y:.4} R{radius}");
                 }
@@ -565,9 +569,4 @@ impl Generator {
         }
         self.text.push_str("G40\nG0 Z5");
     }
-}
-
-#[allow(clippy::disallowed_methods)] // the same program from the same seed matters on one platform only
-fn pkm_kins_sin_cos(angle: f64) -> (f64, f64) {
-    angle.sin_cos()
 }
