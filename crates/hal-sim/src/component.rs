@@ -51,7 +51,7 @@ pub trait Component: std::any::Any + Send + Sync {
     /// Runs one of its functions, numbered in the order of `Hal::add_component`.
     ///
     /// # Errors
-    /// A [`Fault`] stops the HAL.
+    /// A [`Fault`]; the outputs stay as they were, or safe.
     fn run(&mut self, function: usize, values: &mut Values, tick: &Tick<'_>) -> Result<(), Fault>;
 
     /// A copy with its state, so that a whole HAL can be cloned and continued twice.
@@ -98,6 +98,24 @@ pub enum Fault {
         value: f64,
         /// mm or degrees
         limit: f64,
+    },
+    /// A joint is further from its command than allowed.
+    FollowingError {
+        /// Servo period.
+        tick: u64,
+        /// The pin.
+        pin: PinName,
+        /// Commanded less actual position, mm or degrees.
+        value: f64,
+        /// mm or degrees
+        limit: f64,
+    },
+    /// A limit switch is on.
+    LimitSwitch {
+        /// Servo period.
+        tick: u64,
+        /// The pin.
+        pin: PinName,
     },
     /// A parameter was set to what the component cannot use.
     Parameter {
@@ -159,6 +177,10 @@ impl fmt::Display for Fault {
             Self::OutOfTravel { tick, pin, value, limit } => {
                 write!(f, "{pin} is {value} at tick {tick}, beyond the end of travel at {limit}")
             }
+            Self::FollowingError { tick, pin, value, limit } => {
+                write!(f, "{pin} is {value} at tick {tick}, the limit is {limit}")
+            }
+            Self::LimitSwitch { tick, pin } => write!(f, "{pin} is on at tick {tick}"),
             Self::Parameter { tick, pin } => write!(f, "{pin} cannot be used as it is set, at tick {tick}"),
             Self::Steps { tick, joint, error } => write!(f, "stepgen.{joint} at tick {tick}: {error}"),
         }

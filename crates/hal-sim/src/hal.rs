@@ -642,9 +642,11 @@ impl Hal {
     /// Runs one period of the first thread, and of each slower thread that is due; faster threads first.
     ///
     /// # Errors
-    /// The first [`Fault`] of a component; the functions after it do not run.
+    /// The first [`Fault`] of a component. All functions have run nevertheless, and time has gone on: a component that
+    /// refuses leaves its outputs as they were, and the emergency stop works as ever.
     pub fn run(&mut self, setpoint: Option<&Setpoint>) -> Result<(), Fault> {
         let Self { threads, components, values, base_ticks, .. } = self;
+        let mut result = Ok(());
         for thread in threads {
             if *base_ticks % thread.every != 0 {
                 continue;
@@ -652,12 +654,12 @@ impl Hal {
             thread.ticks += 1;
             let tick = Tick { number: thread.ticks, period: thread.period, setpoint };
             for &(component, function) in &thread.run {
-                components[component].run(function, values, &tick)?;
+                result = result.and(components[component].run(function, values, &tick));
             }
             thread.period = thread.period.next();
         }
         *base_ticks += 1;
-        Ok(())
+        result
     }
 }
 

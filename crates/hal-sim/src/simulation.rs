@@ -84,7 +84,7 @@ impl fmt::Display for ConfigError {
 
 impl std::error::Error for ConfigError {}
 
-/// Why a period did not run to its end. The machine must not be driven on after it.
+/// Why a period did not go as wanted. After a fault the machine is stopped as by [`Simulation::emergency_stop`].
 #[derive(Debug, Clone, PartialEq)]
 pub enum TickError<E> {
     /// The source has no setpoint.
@@ -285,7 +285,7 @@ impl Simulation {
     /// Runs one servo period with the next setpoint of `source`.
     ///
     /// # Errors
-    /// `Source`: nothing has run. `Fault`: the HAL stands; do not go on.
+    /// `Source`: nothing has run. `Fault`: as after [`Self::emergency_stop`].
     pub fn tick<S: SetpointSource + ?Sized>(
         &mut self,
         source: &mut S,
@@ -298,14 +298,20 @@ impl Simulation {
     /// Runs one servo period to a given setpoint.
     ///
     /// # Errors
-    /// The fault of a component: the HAL stands; do not go on.
+    /// The fault of a component. The period has run, and the machine is stopped as by [`Self::emergency_stop`]: what
+    /// motion refuses switches the drives off in this same period, what a step generator refuses in the next.
     pub fn tick_to(
         &mut self,
         setpoint: &Setpoint,
         observers: &mut [&mut dyn Observer],
     ) -> Result<TickReport<'_>, Fault> {
-        self.hal.run(Some(setpoint))?;
-        self.setpoint = *setpoint;
+        match self.hal.run(Some(setpoint)) {
+            Ok(()) => self.setpoint = *setpoint,
+            Err(fault) => {
+                self.stop_after(observers);
+                return Err(fault);
+            }
+        }
         Ok(self.conclude(observers))
     }
 
@@ -323,17 +329,33 @@ impl Simulation {
     /// Runs one servo period without a setpoint: after an emergency stop, or at rest.
     ///
     /// # Errors
-    /// The fault of a component.
+    /// The fault of a component, as in [`Self::tick_to`].
     pub fn idle(&mut self, observers: &mut [&mut dyn Observer]) -> Result<TickReport<'_>, Fault> {
-        self.hal.run(None)?;
+        if let Err(fault) = self.hal.run(None) {
+            self.stop_after(observers);
+            return Err(fault);
+        }
         self.setpoint.velocities = [0.0; MAX_JOINTS];
         if !self.hal.values().bit(self.enable) {
-            self.setpoint.in_position = false;
-            for (n, generator) in part::<Stepgen>(&self.hal, STEPGEN).generators().enumerate() {
-                self.setpoint.joints[n] = generator.count() as f64 / self.lines[n].steps_per_unit;
-            }
+            self.stands();
         }
         Ok(self.conclude(observers))
+    }
+
+    /// The period of a fault comes to its end.
+    fn stop_after(&mut self, observers: &mut [&mut dyn Observer]) {
+        self.emergency_stop();
+        self.stands();
+        self.conclude(observers);
+    }
+
+    /// The command is where the steps stand.
+    fn stands(&mut self) {
+        self.setpoint.velocities = [0.0; MAX_JOINTS];
+        self.setpoint.in_position = false;
+        for (n, generator) in part::<Stepgen>(&self.hal, STEPGEN).generators().enumerate() {
+            self.setpoint.joints[n] = generator.count() as f64 / self.lines[n].steps_per_unit;
+        }
     }
 
     fn conclude(&mut self, observers: &mut [&mut dyn Observer]) -> TickReport<'_> {

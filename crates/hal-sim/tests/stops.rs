@@ -3,7 +3,7 @@
 mod common;
 
 use common::{config, machine};
-use pkm_hal_sim::{Edge, Line, Observer, Setpoint, Simulation, TickReport, Value};
+use pkm_hal_sim::{Edge, Line, Observer, Setpoint, SetpointSource, Simulation, TickReport, Value};
 
 /// Steps after a tick.
 struct Late {
@@ -87,4 +87,47 @@ fn late_steps_are_dropped_and_not_counted() {
         stop_and_check(simulation.clone(), tick);
     }
     assert!(dropped > 10, "{dropped}: the test does not test");
+}
+
+#[test]
+fn after_any_fault_the_machine_stands_and_can_go_on() {
+    let (simulation, mut source) = machine(3);
+    let bad = |change: &dyn Fn(&mut Simulation, &mut Setpoint), message: &str| {
+        for tick in [1, 2, 40, 523] {
+            let mut simulation = simulation.clone();
+            for _ in 1..tick {
+                simulation.tick(&mut common::Waves { joints: 3 }, &mut []).unwrap();
+            }
+            let mut setpoint = common::Waves { joints: 3 }.next(tick).unwrap();
+            change(&mut simulation, &mut setpoint);
+            let fault = simulation.tick_to(&setpoint, &mut []).unwrap_err().to_string();
+            assert_eq!(fault.split(" at tick").next(), Some(message), "tick {tick}: {fault}");
+            assert_eq!(simulation.tick_number(), tick);
+            let stands = simulation.feedback();
+            for name in ["joint.0.pos-lim-sw-in", "joint.2.neg-lim-sw-in"] {
+                simulation.hal_mut().setp(name, Value::Bit(false)).unwrap();
+            }
+            simulation.hal_mut().setp("joint.1.f-error-lim", Value::Float(0.0)).unwrap();
+            simulation.idle(&mut []).unwrap();
+            assert_eq!(simulation.feedback(), stands, "tick {tick}");
+            stop_and_check(simulation, tick + 1);
+        }
+    };
+    let set =
+        |simulation: &mut Simulation, name: &str, value| simulation.hal_mut().setp(name, value).unwrap();
+    bad(&|_, s| s.joints[1] = f64::NAN, "joint.1.pos-cmd was given NaN");
+    bad(&|_, s| s.velocities[2] = f64::NEG_INFINITY, "joint.2.vel-cmd was given -inf");
+    bad(&|_, s| s.velocities[2] = 1e9, "stepgen.2");
+    bad(&|s, _| set(s, "joint.0.pos-lim-sw-in", Value::Bit(true)), "joint.0.pos-lim-sw-in is on");
+    bad(&|s, _| set(s, "joint.2.neg-lim-sw-in", Value::Bit(true)), "joint.2.neg-lim-sw-in is on");
+    // a following error that is not there cannot be provoked by the stepper itself: half a step is legal
+    source.joints = 3;
+    let mut simulation = simulation;
+    set(&mut simulation, "joint.1.f-error-lim", Value::Float(0.5 / 400.0 + 1e-9));
+    for _ in 0..1000 {
+        simulation.tick(&mut source, &mut []).unwrap();
+    }
+    set(&mut simulation, "joint.1.f-error-lim", Value::Float(1e-7));
+    let fault = (0..10).find_map(|_| simulation.tick(&mut source, &mut []).err()).unwrap();
+    assert!(fault.to_string().starts_with("joint.1.f-error is "), "{fault}");
 }

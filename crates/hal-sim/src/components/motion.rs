@@ -9,6 +9,8 @@
 //! | `joint.N.pos-fb`         | float out | `motor-pos-fb` as it was at the beginning of the period    |
 //! | `joint.N.f-error`        | float out | commanded less actual position there                       |
 //! | `axis.L.pos-cmd`         | float out | commanded pose, mm or degrees                              |
+//! | `joint.N.f-error-lim`    | float rw  | largest such difference allowed; 0 = any                   |
+//! | `joint.N.pos-lim-sw-in`, `.neg-lim-sw-in` | bit in | limit switches                               |
 //! | `joint.N.amp-enable-out` | bit out   | the joint's drive is to be on                              |
 //! | `motion.enable`          | bit in    | false (emergency stop): drives off, commands follow `motor-pos-fb` |
 //! | `motion.in-position`     | bit out   | nothing moves and nothing is waiting                       |
@@ -17,7 +19,9 @@
 //! Functions: `motion-command-handler` (nothing to do here, kept for HAL files), `motion-controller`.
 //!
 //! What no machine can follow is refused here, before any pin shows it: NaN, infinity, a position out of travel, a jump
-//! beyond what the pulses of one period can do.
+//! beyond what the pulses of one period can do. A following error beyond its limit or a limit switch stops too. Each of
+//! them is a [`Fault`] and switches all drives off in the same period, as if `motion.enable` were false, until that has
+//! been false and true again.
 
 use crate::component::{Component, Fault, PinIndex, PinName, Setpoint, Tick};
 use crate::hal::{Hal, HalError, Role};
@@ -47,6 +51,9 @@ struct JointPins {
     motor_pos_fb: FloatPin,
     pos_fb: FloatPin,
     f_error: FloatPin,
+    f_error_lim: FloatPin,
+    pos_lim_sw_in: BitPin,
+    neg_lim_sw_in: BitPin,
     amp_enable_out: BitPin,
 }
 
@@ -60,6 +67,8 @@ pub struct Motion {
     program_line: S32Pin,
     /// mm or rad
     last: Vec<f64>,
+    /// A fault keeps the drives off until `enable` has been false.
+    stopped: bool,
 }
 
 /// mm stay mm, rad become degrees.
@@ -76,6 +85,10 @@ fn kept(kind: JointKind, value: f64) -> f64 {
         JointKind::Linear => value,
         JointKind::Rotary => maths::radians(value),
     }
+}
+
+fn bit(hal: &mut Hal, joint: usize, pin: &str, role: Role, value: bool) -> Result<BitPin, HalError> {
+    hal.new_bit("motion", &format!("joint.{joint}.{pin}"), role, value)
 }
 
 const fn joint_pin(joint: usize, pin: &'static str) -> PinName {
@@ -100,12 +113,10 @@ impl Motion {
                 motor_pos_fb: float("motor-pos-fb", Role::In, start)?,
                 pos_fb: float("pos-fb", Role::Out, start)?,
                 f_error: float("f-error", Role::Out, 0.0)?,
-                amp_enable_out: hal.new_bit(
-                    "motion",
-                    &format!("joint.{n}.amp-enable-out"),
-                    Role::Out,
-                    true,
-                )?,
+                f_error_lim: float("f-error-lim", Role::Parameter, 0.0)?,
+                pos_lim_sw_in: bit(hal, n, "pos-lim-sw-in", Role::In, false)?,
+                neg_lim_sw_in: bit(hal, n, "neg-lim-sw-in", Role::In, false)?,
+                amp_enable_out: bit(hal, n, "amp-enable-out", Role::Out, true)?,
             };
             with_pins.push((*joint, pins));
         }
@@ -121,6 +132,7 @@ impl Motion {
             in_position: hal.new_bit("motion", "motion.in-position", Role::Out, true)?,
             program_line: hal.new_s32("motion", "motion.program-line", Role::Out, 0)?,
             last: joints.iter().map(|joint| joint.start).collect(),
+            stopped: false,
         };
         hal.add_component(
             Box::new(motion),
@@ -161,26 +173,61 @@ impl Motion {
         Ok(())
     }
 
-    fn control(&mut self, values: &mut Values, tick: &Tick<'_>) -> Result<(), Fault> {
-        for (_, pins) in &self.joints {
+    /// Following errors and limit switches, as they were at the beginning of the period.
+    fn watch(&self, values: &mut Values, tick: u64) -> Result<(), Fault> {
+        let mut result = Ok(());
+        for (n, (_, pins)) in self.joints.iter().enumerate() {
             let position = values.float(pins.motor_pos_fb);
+            let error = values.float(pins.pos_cmd) - position;
             values.set_float(pins.pos_fb, position);
-            values.set_float(pins.f_error, values.float(pins.pos_cmd) - position);
-        }
-        let enabled = values.bit(self.enable);
-        for (_, pins) in &self.joints {
-            values.set_bit(pins.amp_enable_out, enabled);
-        }
-        if !enabled {
-            for ((joint, pins), last) in self.joints.iter().zip(&mut self.last) {
-                let position = values.float(pins.motor_pos_fb);
-                values.set_float(pins.pos_cmd, position);
-                values.set_float(pins.motor_pos_cmd, position);
-                values.set_float(pins.vel_cmd, 0.0);
-                *last = kept(joint.kind, position);
+            values.set_float(pins.f_error, error);
+            let limit = values.float(pins.f_error_lim);
+            if limit > 0.0 && !(error.abs() <= limit) {
+                let pin = joint_pin(n, "f-error");
+                result = result.and(Err(Fault::FollowingError { tick, pin, value: error, limit }));
             }
-            values.set_bit(self.in_position, false);
+            for (pin, name) in [(pins.pos_lim_sw_in, "pos-lim-sw-in"), (pins.neg_lim_sw_in, "neg-lim-sw-in")]
+            {
+                if values.bit(pin) {
+                    result = result.and(Err(Fault::LimitSwitch { tick, pin: joint_pin(n, name) }));
+                }
+            }
+        }
+        result
+    }
+
+    /// Drives off; the commands are where the motors are.
+    fn stand(&mut self, values: &mut Values) {
+        for ((joint, pins), last) in self.joints.iter().zip(&mut self.last) {
+            let position = values.float(pins.motor_pos_fb);
+            values.set_float(pins.pos_cmd, position);
+            values.set_float(pins.motor_pos_cmd, position);
+            values.set_float(pins.vel_cmd, 0.0);
+            values.set_bit(pins.amp_enable_out, false);
+            *last = kept(joint.kind, position);
+        }
+        values.set_bit(self.in_position, false);
+    }
+
+    fn control(&mut self, values: &mut Values, tick: &Tick<'_>) -> Result<(), Fault> {
+        let watched = self.watch(values, tick.number);
+        if !values.bit(self.enable) {
+            self.stopped = false;
+            self.stand(values);
             return Ok(());
+        }
+        if self.stopped {
+            self.stand(values);
+            return Ok(());
+        }
+        let checked = watched.and(tick.setpoint.map_or(Ok(()), |setpoint| self.check(setpoint, tick.number)));
+        if checked.is_err() {
+            self.stopped = true;
+            self.stand(values);
+            return checked;
+        }
+        for (_, pins) in &self.joints {
+            values.set_bit(pins.amp_enable_out, true);
         }
         let Some(setpoint) = tick.setpoint else {
             for (_, pins) in &self.joints {
@@ -188,7 +235,6 @@ impl Motion {
             }
             return Ok(());
         };
-        self.check(setpoint, tick.number)?;
         let commands = setpoint.joints.iter().zip(&setpoint.velocities);
         for (((joint, pins), (&value, &velocity)), last) in
             self.joints.iter().zip(commands).zip(&mut self.last)
