@@ -83,8 +83,13 @@ fn round_trip_from_poses() {
                 // Inverse and forward give the guide's line the same slack; rounding decides beyond it.
                 Err(ForwardError::GuideSide { excess_mm, .. }) if excess_mm < 1.1e-9 => continue,
                 Err(error) => {
-                    // Allowed only where the platform is not held (Lambda also within its σ guard).
-                    let guard = if m.kind() == "Lambda6" { 0.06 } else { 1e-6 };
+                    // Allowed only where the platform is not held (Lambda: within its σ guard).
+                    // A hexapod's seed may lie beyond a singularity this near.
+                    let guard = match m.kind() {
+                        "Lambda6" => 0.06,
+                        "Hexapod" => 1e-3,
+                        _ => 1e-6,
+                    };
                     assert!(measure.forward < guard, "{pose:?}: {error} at {measure:?}");
                     continue;
                 }

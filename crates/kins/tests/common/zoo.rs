@@ -71,7 +71,7 @@ impl Case {
     /// A pose at or near the edge of reach: bisected between a reachable and an unreachable one, then back by 10^-k.
     pub fn edge_pose(&self, rng: &mut Rng) -> Option<Pose> {
         let (mut inside, mut outside) = (None, None);
-        for _ in 0..100 {
+        for _ in 0..10 {
             let pose = self.pose(rng);
             if self.mechanism.inverse(&pose).is_ok() {
                 inside = Some(pose)
