@@ -132,7 +132,7 @@ pub struct TickReport<'a> {
 
 /// Sees everything that the machine does: for each period first its edges in order of time, then the report.
 pub trait Observer {
-    /// False: edges are not wanted, and need not be brought in order.
+    /// False: edges are not wanted. They come all the same if another observer wants them.
     fn wants_edges(&self) -> bool {
         true
     }
@@ -441,7 +441,7 @@ impl Simulation {
             }
             let Some((n, edge)) = first else { return };
             next[n] += 1;
-            for observer in observers.iter_mut().filter(|observer| observer.wants_edges()) {
+            for observer in observers.iter_mut() {
                 observer.edge(edge);
             }
         }

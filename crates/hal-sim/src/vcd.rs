@@ -19,8 +19,54 @@ pub struct VcdWriter<W: Write> {
     /// VCD time units per timer tick.
     per_tick: u64,
     servo_ticks: u64,
+    stamp: Stamp,
     time: Option<u64>,
     end: u64,
+}
+
+/// The text of a time, `#123456789\n`. Times come in order, so all but the last four digits are mostly those of before.
+#[derive(Debug)]
+struct Stamp {
+    text: [u8; 32],
+    /// Time / 10⁴ that is in the text, and its end there; 0: none.
+    high: u64,
+    high_end: usize,
+    end: usize,
+}
+
+impl Stamp {
+    const fn new() -> Self {
+        Self { text: [b'#'; 32], high: 0, high_end: 1, end: 1 }
+    }
+
+    #[inline]
+    fn set(&mut self, time: u64) {
+        let (high, low) = (time / 10_000, (time % 10_000) as u16);
+        if high != self.high || high == 0 {
+            self.high = high;
+            let mut digits = itoa::Buffer::new();
+            let digits = digits.format(if high == 0 { time } else { high }).as_bytes();
+            self.high_end = 1 + digits.len();
+            self.text[1..self.high_end].copy_from_slice(digits);
+            if high == 0 {
+                self.text[self.high_end] = b'\n';
+                self.end = self.high_end + 1;
+                return;
+            }
+        }
+        let digit = |value: u16| b'0' + (value % 10) as u8;
+        let tail = [digit(low / 1000), digit(low / 100), digit(low / 10), digit(low), b'\n'];
+        self.end = self.high_end + tail.len();
+        self.text[self.high_end..self.end].copy_from_slice(&tail);
+    }
+
+    /// A copy of fixed length is cheaper than one of the right length.
+    #[inline]
+    fn append_to(&self, out: &mut Vec<u8>) {
+        let length = out.len() + self.end;
+        out.extend_from_slice(&self.text);
+        out.truncate(length);
+    }
 }
 
 /// VCD's unit for a timer period, and timer ticks in it.
@@ -50,14 +96,12 @@ impl<W: Write> VcdWriter<W> {
         };
         let changes = ids.into_iter().map(|(dir, step)| [line(dir), line(step)]).collect();
         let servo_ticks = simulation.servo_period_ns() / simulation.hal().timer_period_ns();
-        Self { out, changes, per_tick, servo_ticks, time: None, end: 0 }
+        Self { out, changes, per_tick, servo_ticks, stamp: Stamp::new(), time: None, end: 0 }
     }
 
     fn time(&mut self, ticks: u64) {
-        let text = &mut self.out.text;
-        text.push(b'#');
-        text.extend_from_slice(itoa::Buffer::new().format(ticks * self.per_tick).as_bytes());
-        text.push(b'\n');
+        self.stamp.set(ticks * self.per_tick);
+        self.stamp.append_to(&mut self.out.text);
         self.time = Some(ticks);
     }
 
@@ -203,6 +247,23 @@ impl<R: BufRead> VcdSteps<R> {
             } else if id == step && level {
                 self.counts[n] += if self.positive[n] { 1 } else { -1 };
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stamps_are_decimal_numbers() {
+        let mut stamp = Stamp::new();
+        let times = [0, 7, 42, 9999, 10_000, 10_001, 19_999, 20_000, 123_456_789, 123_459_999, 5, 99_990_000];
+        for time in times.into_iter().chain([u64::MAX, u64::MAX - 9999]) {
+            stamp.set(time);
+            let mut text = b"x".to_vec();
+            stamp.append_to(&mut text);
+            assert_eq!(String::from_utf8_lossy(&text), format!("x#{time}\n"));
         }
     }
 }
