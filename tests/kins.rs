@@ -183,6 +183,173 @@ fn moma_w_matches_the_vectors() {
 }
 
 #[test]
+fn hv_mill_matches_the_vectors() {
+    let vectors = vectors();
+    for (mode, data) in vectors["hv_mill"]["modes"].as_object().unwrap() {
+        let name = mode.split('_').next().unwrap().to_lowercase();
+        let machine = format!("hv-mill-{name}");
+        let vertical = name.starts_with('v');
+        let flags: &[&str] = match data.get("override") {
+            None => &[],
+            Some(_) => &["--set", "kinematics.table_sense=-1", "--set", "kinematics.head.head_sense=-1"],
+        };
+        let pose = |row: &Value| match vertical {
+            true => json!({ "x": row[0], "y": row[1], "z": row[2], "c": row[3], "b": row[4] }),
+            false => json!({ "x": row[0], "y": row[1], "z": row[2], "b": row[3] }),
+        };
+        let rows = array(&data["rows"]);
+        let poses: Vec<Value> = rows.iter().map(pose).collect();
+        let joints: Vec<Value> = rows
+            .iter()
+            .map(|row| match vertical {
+                true => json!({ "joints": [row[5], row[6], row[7], row[3], row[4]] }),
+                false => json!({ "joints": [row[5], row[6], row[7], row[3]] }),
+            })
+            .collect();
+        let (inverse, status) = ask("inverse", &machine, flags, &poses);
+        assert_eq!(status, 0, "{machine}: {inverse:?}");
+        let (forward, status) = ask("forward", &machine, flags, &joints);
+        assert_eq!(status, 0, "{machine}: {forward:?}");
+        for (i, row) in rows.iter().enumerate() {
+            let context = format!("{mode} row {i}");
+            for j in 0..3 {
+                assert_near(&inverse[i]["joints"][j], &row[5 + j], &context);
+                assert_near(&forward[i]["pose"][["x", "y", "z"][j]], &row[j], &context);
+            }
+        }
+        // Columns of the machine in letter order X Y Z B (C); of the vectors w1 w2 w3 table head.
+        let columns: &[usize] = if vertical { &[0, 1, 2, 4, 3] } else { &[0, 1, 2, 3] };
+        let jacobians = array(&data["jac_of_first_rows"]);
+        let (answers, _) = ask("jacobian", &machine, flags, &poses[..jacobians.len()]);
+        for (answer, expected) in answers.iter().zip(jacobians) {
+            for row in 0..3 {
+                for (column, &theirs) in columns.iter().enumerate() {
+                    // In the three-axis mode the rotary axes are locked: their columns are 0 here.
+                    if mode.ends_with('3') && theirs > 2 {
+                        continue;
+                    }
+                    assert_near(&answer["inverse_jacobian"][row][column], &expected[row][theirs], mode);
+                }
+            }
+        }
+        if let Some(bad) = data["bad"].as_array() {
+            let questions: Vec<Value> = bad.iter().map(pose).collect();
+            check_refused(
+                "inverse",
+                &machine,
+                &questions,
+                &bad.iter().map(|row| &row[5]).collect::<Vec<_>>(),
+            );
+        }
+    }
+}
+
+#[test]
+fn ox_glide_matches_the_vectors() {
+    let vectors = vectors();
+    for (form, data) in vectors["ox_glide"]["forms"].as_object().unwrap() {
+        let machine = format!("ox-glide-{}", form.to_lowercase());
+        let rows = array(&data["rows"]);
+        let pose = |row: &Value| json!({ "x": row[0], "y": row[1], "z": row[2] });
+        let (inverse, status) = ask("inverse", &machine, &[], &rows.iter().map(pose).collect::<Vec<_>>());
+        assert_eq!(status, 0, "{inverse:?}");
+        let joints: Vec<Value> =
+            rows.iter().map(|row| json!({ "joints": [row[3], row[4], row[5]] })).collect();
+        let (forward, _) = ask("forward", &machine, &[], &joints);
+        let (jacobian, _) = ask("jacobian", &machine, &[], &rows.iter().map(pose).collect::<Vec<_>>());
+        for (i, row) in rows.iter().enumerate() {
+            let context = format!("{form} row {i}");
+            for j in 0..3 {
+                assert_near(&inverse[i]["joints"][j], &row[3 + j], &context);
+                assert_near(&forward[i]["pose"][["x", "y", "z"][j]], &row[j], &context);
+            }
+            assert_near(&jacobian[i]["inverse_jacobian"][0][1], &row[6], &context);
+            assert_near(&jacobian[i]["inverse_jacobian"][1][1], &row[7], &context);
+            assert_near(&jacobian[i]["determinant"], &row[8], &context);
+        }
+        for (what, key) in [("inverse", "ik_bad"), ("forward", "fk_bad")] {
+            let bad = array(&data[key]);
+            let last = bad[0].as_array().unwrap().len() - 1;
+            let questions: Vec<Value> = bad
+                .iter()
+                .map(|row| match what {
+                    "inverse" => pose(row),
+                    _ => json!({ "joints": [row[0], row[1], if last > 2 { row[2].clone() } else { json!(100) }] }),
+                })
+                .collect();
+            check_refused(what, &machine, &questions, &bad.iter().map(|row| &row[last]).collect::<Vec<_>>());
+        }
+    }
+}
+
+/// A pose of the Lambda vectors (mm, rad) as the command line takes it (degrees).
+fn lambda_pose(pose: &Value) -> Value {
+    let degrees = |i: usize| number(&pose[i]).to_degrees();
+    json!({ "x": pose[0], "y": pose[1], "z": pose[2], "a": degrees(3), "b": degrees(4), "c": degrees(5) })
+}
+
+#[test]
+fn lambda_matches_the_vectors() {
+    let vectors: Value =
+        serde_json::from_str(include_str!("../crates/kins/tests/data/lambda-examples.json")).unwrap();
+    let machine = |set: &str| match set {
+        "yaw45" => Some("lambda6"),
+        "paper" => Some("lambda6-paper"),
+        _ => None, // sets that do not ship are tested in pkm-kins
+    };
+    let mut seen = 0;
+    for row in array(&vectors["poses"]) {
+        let Some(machine) = machine(row["set"].as_str().unwrap()) else { continue };
+        let context = row["id"].as_str().unwrap();
+        let pose = lambda_pose(&row["pose"]);
+        let (inverse, _) = ask("inverse", machine, &["--no-limits"], &[pose.clone()]);
+        for j in 0..6 {
+            assert_near(&inverse[0]["joints"][j], &row["joints"][j], context);
+        }
+        let violations = array(&row["violations"]);
+        let (limited, status) = ask("inverse", machine, &[], &[pose.clone()]);
+        assert_eq!(status, i32::from(!violations.is_empty()), "{context}: {limited:?}");
+        assert!(
+            violations.is_empty() || violations.contains(&limited[0]["error"]["code"]),
+            "{context}: {limited:?}"
+        );
+        let (jacobian, _) = ask("jacobian", machine, &["--no-limits"], &[pose.clone()]);
+        let relative = |key: &str, theirs: &str| {
+            let (found, expected) = (number(&jacobian[0][key]), number(&row[theirs]));
+            assert!(
+                (found - expected).abs() <= 1e-8 * expected.abs(),
+                "{context} {key}: {found} is not {expected}"
+            );
+        };
+        relative("determinant", "det_pose_mm3");
+        relative("condition", "cond");
+        if number(&row["sigma"]).abs() > 0.1 {
+            let question = json!({ "joints": row["joints"], "seed": pose });
+            let (forward, status) = ask("forward", machine, &["--no-limits"], &[question]);
+            assert_eq!(status, 0, "{context}: {forward:?}");
+            for letter in ["x", "y", "z", "a", "b", "c"] {
+                let (found, expected) = (number(&forward[0]["pose"][letter]), number(&pose[letter]));
+                assert!((found - expected).abs() < 1e-6, "{context} {letter}: {found} is not {expected}");
+            }
+        }
+        seen += 1;
+    }
+    assert!(seen >= 8, "{seen} rows");
+    for row in array(&vectors["fk_from_joints"]) {
+        let Some(machine) = machine(row["set"].as_str().unwrap()) else { continue };
+        let question = json!({ "joints": row["joints"], "branches": true });
+        let (answers, _) = ask("forward", machine, &["--no-limits"], &[question]);
+        assert_eq!(array(&answers[0]["branches"]).len(), array(&row["all_poses"]).len(), "{}", row["id"]);
+    }
+    for row in array(&vectors["fk_invalid"]) {
+        let Some(machine) = machine(row["set"].as_str().unwrap()) else { continue };
+        let (answers, status) =
+            ask("forward", machine, &["--no-limits"], &[json!({ "joints": row["joints"] })]);
+        assert_eq!((&answers[0]["error"]["code"], status), (&row["error"], 1), "{}", row["id"]);
+    }
+}
+
+#[test]
 fn no_limits_asks_for_geometry_alone() {
     let question = [json!({ "joints": [-10, -10] })];
     let (answers, status) = ask("forward", "moma-a", &[], &question);

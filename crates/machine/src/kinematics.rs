@@ -11,12 +11,15 @@
 //! | `hv-machine` | [`HvMachineParameters`]: both, `[kinematics.h]`, `[kinematics.v]` |
 //! | `ox-glide`  | [`OxGlideParameters`]                                           |
 //! | `lambda6`   | [`Lambda6Parameters`]                                           |
+//! | `linear-delta` | [`LinearDeltaParameters`]                                    |
+//! | `hexapod`   | [`HexapodParameters`]                                           |
 
 use crate::source::Findings;
 use pkm_kins::{
-    Axis, AxisSet, Cartesian, GeometryError, HvMachine, HvMachineParameters, HvMill, HvMillParameters,
-    HvSideParameters, Key, Lambda6, Lambda6Parameters, Mechanism, Moma, Moma4s, Moma4sParameters,
-    MomaParameters, MomaW, MomaWParameters, OxGlide, OxGlideParameters, Planar, PlanarParameters, Spindle,
+    Axis, AxisSet, Cartesian, GeometryError, Hexapod, HexapodParameters, HvMachine, HvMachineParameters,
+    HvMill, HvMillParameters, HvSideParameters, Key, Lambda6, Lambda6Parameters, LinearDelta,
+    LinearDeltaParameters, Mechanism, Moma, Moma4s, Moma4sParameters, MomaParameters, MomaW, MomaWParameters,
+    OxGlide, OxGlideParameters, Planar, PlanarParameters, Spindle,
 };
 use serde::Deserialize;
 use std::ops::Range;
@@ -47,6 +50,8 @@ pub enum Parameters {
     HvMachine(HvMachineParameters),
     OxGlide(OxGlideParameters),
     Lambda6(Lambda6Parameters),
+    LinearDelta(LinearDeltaParameters),
+    Hexapod(HexapodParameters),
 }
 
 /// A Cartesian machine as written.
@@ -58,8 +63,19 @@ pub struct CartesianParameters {
 }
 
 /// The `type` names.
-pub const TYPES: [&str; 9] =
-    ["cartesian", "planar", "moma", "moma-4s", "moma-w", "hv-mill", "hv-machine", "ox-glide", "lambda6"];
+pub const TYPES: [&str; 11] = [
+    "cartesian",
+    "planar",
+    "moma",
+    "moma-4s",
+    "moma-w",
+    "hv-mill",
+    "hv-machine",
+    "ox-glide",
+    "lambda6",
+    "linear-delta",
+    "hexapod",
+];
 
 /// Where a key's value stands, so that a geometry error can point at it.
 #[derive(Debug, Clone)]
@@ -117,6 +133,8 @@ impl KinematicsFile {
             "hv-machine" => HvMachineParameters::deserialize(parameters).map(Parameters::HvMachine),
             "ox-glide" => OxGlideParameters::deserialize(parameters).map(Parameters::OxGlide),
             "lambda6" => Lambda6Parameters::deserialize(parameters).map(Parameters::Lambda6),
+            "linear-delta" => LinearDeltaParameters::deserialize(parameters).map(Parameters::LinearDelta),
+            "hexapod" => HexapodParameters::deserialize(parameters).map(Parameters::Hexapod),
             _ => {
                 let message = format!("kinematics.type = {kind:?} is not a mechanism");
                 findings.error("machine-mechanism", kind_span, message, &known_types());
@@ -152,6 +170,8 @@ impl KinematicsFile {
             Parameters::HvMachine(p) => HvMachine::new(p).map(Mechanism::from),
             Parameters::OxGlide(p) => OxGlide::new(p).map(Mechanism::from),
             Parameters::Lambda6(p) => Lambda6::new(p).map(Mechanism::from),
+            Parameters::LinearDelta(p) => LinearDelta::new(p).map(Mechanism::from),
+            Parameters::Hexapod(p) => Hexapod::new(p).map(Mechanism::from),
         };
         built
             .map_err(|error| {

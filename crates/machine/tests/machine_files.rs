@@ -213,6 +213,46 @@ fn a_fault_in_a_nested_table_is_shown_there() {
     );
 }
 
+/// moma-a with another mechanism, six joints and another home.
+fn with_kinematics(kinematics: &str, joints: usize, home: &str) -> String {
+    let text = shipped::text("moma-a").unwrap();
+    let head = &text[..text.find("[kinematics]").unwrap()];
+    let joints: String = (1..=joints)
+        .map(|n| {
+            format!(
+                "[[joint]]\nname = \"j{n}\"\nmin_mm = -1000\nmax_mm = 1000\nmax_velocity_mm_s = 100\n\
+                 max_acceleration_mm_s2 = 1000\nsteps_per_mm = 100\n"
+            )
+        })
+        .collect();
+    format!("{head}[kinematics]\n{kinematics}\n{joints}[home]\n{home}\n")
+}
+
+#[test]
+fn mechanisms_that_do_not_ship_can_be_written() {
+    let delta = "type = \"linear-delta\"\njoint_radius_mm = 105\njoint_length_mm = 217";
+    let delta = Machine::parse("delta.toml", &with_kinematics(delta, 3, "z = 10"), &[]).unwrap();
+    assert_eq!(delta.mechanism.joint_count(), 3);
+    let points = |radius: f64, spread: f64| -> Vec<String> {
+        let point = |k: i32| {
+            let side = if k % 2 == 0 { -spread } else { spread };
+            let angle = maths::radians(120.0 * f64::from(k / 2) + side);
+            format!("[{}, {}, 0.0]", radius * maths::cos(angle), radius * maths::sin(angle))
+        };
+        (0..6).map(point).collect()
+    };
+    let hexapod = format!(
+        "type = \"hexapod\"\nbase_mm = [{}]\nplatform_mm = [{}]\nstart_z_mm = 150",
+        points(120.0, 10.0).join(", "),
+        points(60.0, 50.0).join(", ")
+    );
+    let hexapod = Machine::parse("hexapod.toml", &with_kinematics(&hexapod, 6, "z = 150"), &[]).unwrap();
+    assert_eq!(hexapod.mechanism.joint_count(), 6);
+    let flat = "type = \"linear-delta\"\njoint_radius_mm = 217\njoint_length_mm = 105";
+    let finding = refusal(Machine::parse("delta.toml", &with_kinematics(flat, 3, "z = 10"), &[]));
+    assert_eq!(finding.code, "machine-geometry");
+}
+
 #[test]
 fn all_findings_are_collected() {
     let text = shipped::text("moma-a")

@@ -2,7 +2,6 @@
 
 use crate::cli::{Kins, KinsArgs};
 use crate::outcome::{Failure, Outcome};
-use nalgebra::DMatrix;
 use pkm_kins::{Axis, Joints, Kinematics, MAX_JOINTS, Pose, maths};
 use pkm_machine::{Machine, Refusal};
 use serde::{Deserialize, Serialize};
@@ -216,11 +215,12 @@ impl Query {
             .take(mechanism.joint_count())
             .map(|row| columns.iter().map(|&column| row[column]).collect())
             .collect();
-        let matrix = DMatrix::from_fn(rows.len(), columns.len(), |row, column| rows[row][column]);
+        let dexterity = mechanism.dexterity(&pose).map_err(refuse)?;
         Ok(Answer {
             joints: Some(self.face(&joints)),
-            determinant: matrix.is_square().then(|| matrix.determinant()),
-            condition: condition(&matrix),
+            determinant: Some(dexterity.determinant),
+            // Infinite at a direct singularity: JSON has no number for that, the key is then absent.
+            condition: Some(dexterity.condition).filter(|condition| condition.is_finite()),
             inverse_jacobian: Some(rows),
             ..Answer::default()
         })
@@ -272,10 +272,4 @@ impl Query {
     fn face(&self, joints: &Joints) -> Vec<f64> {
         self.machine.joints.iter().zip(joints).map(|(machine, &joint)| machine.to_face(joint)).collect()
     }
-}
-
-/// Largest by smallest singular value; `None` where it is not finite.
-fn condition(matrix: &DMatrix<f64>) -> Option<f64> {
-    let values = matrix.clone().singular_values();
-    Some(values.max() / values.min()).filter(|condition| condition.is_finite())
 }
