@@ -302,18 +302,18 @@ fn lambda_matches_the_vectors() {
         let Some(machine) = machine(row["set"].as_str().unwrap()) else { continue };
         let context = row["id"].as_str().unwrap();
         let pose = lambda_pose(&row["pose"]);
-        let (inverse, _) = ask("inverse", machine, &["--no-limits"], &[pose.clone()]);
+        let (inverse, _) = ask("inverse", machine, &["--no-limits"], std::slice::from_ref(&pose));
         for j in 0..6 {
             assert_near(&inverse[0]["joints"][j], &row["joints"][j], context);
         }
         let violations = array(&row["violations"]);
-        let (limited, status) = ask("inverse", machine, &[], &[pose.clone()]);
+        let (limited, status) = ask("inverse", machine, &[], std::slice::from_ref(&pose));
         assert_eq!(status, i32::from(!violations.is_empty()), "{context}: {limited:?}");
         assert!(
             violations.is_empty() || violations.contains(&limited[0]["error"]["code"]),
             "{context}: {limited:?}"
         );
-        let (jacobian, _) = ask("jacobian", machine, &["--no-limits"], &[pose.clone()]);
+        let (jacobian, _) = ask("jacobian", machine, &["--no-limits"], std::slice::from_ref(&pose));
         let relative = |key: &str, theirs: &str| {
             let (found, expected) = (number(&jacobian[0][key]), number(&row[theirs]));
             assert!(

@@ -1,5 +1,6 @@
 //! Whole-program tests of `pkm`: what goes in at the command line, what comes out, and the exit status.
 
+mod canon;
 mod kins;
 mod machines;
 mod programs;

@@ -43,6 +43,8 @@ pub(crate) enum Command {
     Run(Run),
     /// Everything that can be said before cutting, without producing pulses
     Check(Check),
+    /// Interpret without a machine and print canonical commands in LinuxCNC's text format
+    Canon(Canon),
     /// Pose to joints and back, JSON lines in and out
     #[command(subcommand)]
     Kins(Kins),
@@ -61,7 +63,7 @@ impl Command {
             }
             Self::Run(arguments) => &arguments.program.machine.set,
             Self::Check(arguments) => &arguments.program.machine.set,
-            Self::Machines(_) | Self::Generate(_) => &[],
+            Self::Canon(_) | Self::Machines(_) | Self::Generate(_) => &[],
         }
     }
 }
@@ -128,6 +130,73 @@ fn percent(text: &str) -> Result<f64, String> {
 pub(crate) struct Check {
     #[command(flatten)]
     pub program: ProgramArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Canon {
+    /// G-code program; `-` is standard input
+    pub program: PathBuf,
+    /// Write the commands to this file instead of standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Tool table in LinuxCNC's format
+    #[arg(long, value_name = "FILE")]
+    pub tool_table: Option<PathBuf>,
+    /// The machine's length unit is the inch, as in LinuxCNC's rs274 (the default)
+    #[arg(long, conflicts_with = "mm")]
+    pub inch: bool,
+    /// The machine's length unit is the millimetre
+    #[arg(long)]
+    pub mm: bool,
+    /// Axes of the machine
+    #[arg(long, value_name = "LETTERS", default_value = "XYZABC", value_parser = axes)]
+    pub axes: pkm_kins::AxisSet,
+    /// Whose rules decide where versions differ
+    #[arg(long, value_enum, default_value_t = Dialect::LinuxCnc29)]
+    pub dialect: Dialect,
+    /// Skip the lines that begin with `/`
+    #[arg(long)]
+    pub block_delete: bool,
+    /// What to do after an error
+    #[arg(long, value_enum, default_value_t = OnError::Stop)]
+    pub on_error: OnError,
+}
+
+/// Whose rules decide where versions differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Dialect {
+    /// LinuxCNC 2.9, as Debian ships it
+    #[value(name = "linuxcnc-2.9")]
+    LinuxCnc29,
+    /// LinuxCNC 2.10
+    #[value(name = "linuxcnc-2.10")]
+    LinuxCnc210,
+    /// LinuxCNC's language with its dangerous quirks corrected or refused
+    Pkm,
+}
+
+/// What to do after an error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OnError {
+    /// End the program
+    Stop,
+    /// Go on with the next block
+    Continue,
+}
+
+/// Axis letters, each once.
+fn axes(text: &str) -> Result<pkm_kins::AxisSet, String> {
+    let mut axes = Vec::new();
+    for letter in text.to_ascii_uppercase().chars() {
+        match pkm_kins::Axis::ALL.into_iter().find(|axis| axis.letter() == letter) {
+            Some(axis) if !axes.contains(&axis) => axes.push(axis),
+            _ => return Err("letters of XYZABCUVW, each once".into()),
+        }
+    }
+    if axes.is_empty() {
+        return Err("at least one axis".into());
+    }
+    Ok(pkm_kins::AxisSet::new(&axes))
 }
 
 #[derive(Debug, Subcommand)]

@@ -1,5 +1,6 @@
 //! One file per subcommand.
 
+pub(crate) mod canon;
 pub(crate) mod check;
 pub(crate) mod generate;
 pub(crate) mod kins;

@@ -49,17 +49,17 @@ impl Job {
     pub(crate) fn new(arguments: &ProgramArgs) -> Result<Self, Failure> {
         let machine = Machine::load(&arguments.machine.machine, &arguments.machine.set)?;
         let start = arguments.start.as_deref().map(|text| start(&machine, text)).transpose()?;
-        let program = match arguments.program.as_path() {
-            path if path == Path::new("-") => keep("-", stdin().lock())?,
-            path => open(path)?,
-        };
+        let program = open(&arguments.program)?;
         let options = Options { start, block_delete: arguments.block_delete, ..Options::default() };
         Ok(Self { program, machine, options })
     }
 }
 
-/// A program in a file, which is streamed, or in something that can be read only once (a pipe), which is kept.
-fn open(path: &Path) -> Result<Program, Failure> {
+/// A program in a file, which is streamed, or in something that can be read only once (a pipe, `-`), which is kept.
+pub(crate) fn open(path: &Path) -> Result<Program, Failure> {
+    if path == Path::new("-") {
+        return keep("-", stdin().lock());
+    }
     let name = path.display().to_string();
     let refuse = |error: &dyn std::fmt::Display| {
         let message = format!("cannot read {name}: {error}");

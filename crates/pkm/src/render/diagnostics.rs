@@ -43,6 +43,7 @@ impl<'a> From<&'a Diagnostic> for Json<'a> {
 /// Prints messages to standard error.
 pub(crate) struct Messages {
     renderer: Renderer,
+    styled: bool,
     /// The `--set` texts, which diagnostics may point into.
     overrides: String,
 }
@@ -63,7 +64,7 @@ impl Messages {
             }
         };
         let renderer = if styled { Renderer::styled() } else { Renderer::plain() };
-        Self { renderer, overrides: overrides.join("\n") }
+        Self { renderer, styled, overrides: overrides.join("\n") }
     }
 
     /// Prints the messages; a standard error that cannot be written to is ignored.
@@ -72,6 +73,19 @@ impl Messages {
         for diagnostic in diagnostics {
             let _ = writeln!(err, "{}\n", self.text(diagnostic));
         }
+    }
+
+    /// Prints one message as `rs274` does, so that the last two lines are always message and source line:
+    /// `FILE:LINE:COL: error[code]: message`, and the line as it was read. The underlined form comes before, in colour.
+    pub(crate) fn print_plainly(&self, diagnostic: &Diagnostic, source_line: &[u8]) {
+        let mut err = stderr().lock();
+        if self.styled {
+            let _ = writeln!(err, "{}", self.text(diagnostic));
+        }
+        let Diagnostic { code, message, file, line, column, .. } = diagnostic;
+        let _ = writeln!(err, "{file}:{line}:{column}: error[{code}]: {message}");
+        let _ = err.write_all(source_line.trim_ascii_end());
+        let _ = err.write_all(b"\n");
     }
 
     /// One message: title with code, place, underlined source line where it can be read again, help.
