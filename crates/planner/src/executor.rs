@@ -213,16 +213,18 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             let distance = leg.end - e.sigma;
             let (v, v_end) = (sqrt(e.x), sqrt(leg.x));
             let duration = if v + v_end > 0.0 { 2.0 * distance / (v + v_end) } else { f64::INFINITY };
-            if !(duration <= remaining) {
+            let acceleration = (leg.x - e.x) / (2.0 * distance);
+            let speed = v + acceleration * remaining;
+            // Braking to rest may seem to end just before the leg does; that is rounding, and the leg is over.
+            let arrived = duration <= remaining || leg.x == 0.0 && v > 0.0 && !(speed > 0.0);
+            if !arrived {
                 if distance > 0.0 && duration.is_finite() {
-                    let acceleration = (leg.x - e.x) / (2.0 * distance);
-                    let speed = (v + acceleration * remaining).max(0.0);
                     e.sigma = (e.sigma + 0.5 * (v + speed) * remaining).min(leg.end);
                     e.x = speed * speed;
                 }
                 return false;
             }
-            remaining -= duration;
+            remaining = (remaining - duration).max(0.0);
             e.x = leg.x;
             e.legs.remove(0);
             if leg.end < length {
@@ -388,7 +390,8 @@ fn faster<const R: usize>(
     cap: f64,
 ) -> Option<(f64, f64, f64)> {
     let (bottom, top) = (x.min(x_end), x.max(x_end));
-    let cap = cap.max(top);
+    // At half the x that bends as hard as allowed there is still room to speed up and to brake.
+    let cap = cap.min(0.5 * hardest_bend(here, next, rows)).max(top);
     // What the strips allow depends on the highest x there will be, and that on what they allow. A lower guess gives
     // a higher peak and the other way round, so the third is safe: its peak does not exceed what it was computed for.
     let meet = |highest: f64| {
@@ -400,7 +403,7 @@ fn faster<const R: usize>(
     let (second, ..) = meet(first.max(top))?;
     let (peak, up, down) = meet(second.max(top))?;
     // Not worth a change of acceleration.
-    if !(peak >= top) || !(peak - bottom > 1e-9 * peak) || !holds_speed(here, next, rows, peak) {
+    if !(peak >= top) || !(peak - bottom > 1e-9 * peak) {
         return None;
     }
     let ramp = (peak - x) / (2.0 * up);
@@ -408,7 +411,8 @@ fn faster<const R: usize>(
     (ramp < length && brake < length).then(|| (ramp, (length - brake).max(ramp), peak))
 }
 
-/// True if x may stay as it is along the interval.
-fn holds_speed<const R: usize>(here: &Rows<R>, next: &Rows<R>, rows: usize, x: f64) -> bool {
-    [here, next].into_iter().all(|side| side.second.iter().take(rows).all(|q| (q * x).abs() <= 1.0))
+/// The x at which holding the speed alone takes some joint to its acceleration limit.
+fn hardest_bend<const R: usize>(here: &Rows<R>, next: &Rows<R>, rows: usize) -> f64 {
+    let bend = |side: &Rows<R>| side.second.iter().take(rows).fold(0.0_f64, |worst, q| worst.max(q.abs()));
+    1.0 / bend(here).max(bend(next))
 }

@@ -105,6 +105,21 @@ pub(crate) struct Piece {
     pub(crate) span: Span,
 }
 
+impl<K, const R: usize, const PIECES: usize, const NODES: usize> core::fmt::Debug for Planner<K, R, PIECES, NODES> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Planner")
+            .field("pieces", &self.pieces.len())
+            .field("first_piece", &self.first_piece)
+            .field("nodes", &self.nodes.len())
+            .field("grid", &(self.grid.piece, self.grid.s))
+            .field("front", &self.nodes.front())
+            .field("next", &self.nodes.get(1))
+            .field("executor", &self.executor)
+            .field("fault", &self.fault)
+            .finish_non_exhaustive()
+    }
+}
+
 /// Plans moves on a machine with at most `R` limited joints and axes; `PIECES` and `NODES` bound the look-ahead.
 pub struct Planner<K, const R: usize, const PIECES: usize, const NODES: usize> {
     pub(crate) kinematics: K,

@@ -3,42 +3,33 @@
 //!
 //! `val_…`: T_ref is from an outside source. P10 to P12 need the delta and the hexapod.
 
+use crate::harness::{Case, Disturbance, drive, with_stack};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::moma::{Moma, MomaConfiguration};
-use pkm_kins::{Axis, AxisSet, JointRange, Kinematics, Pose};
-use pkm_planner::path::{FeedGroup, Geometry, Line, Tolerance, Vector};
-use pkm_planner::{Feed, JointLimits, Limits, Move, PathMode, Planner, PushError, Settings, State};
+use pkm_kins::{Axis, AxisSet};
+use pkm_planner::path::{Geometry, Line, Tolerance, Vector};
+use pkm_planner::PathMode;
 
 const PERIOD_S: f64 = 1e-3;
 const PI: f64 = core::f64::consts::PI;
 
-type TestPlanner = Planner<Mechanism, 3, 1024, 2048>;
-
-struct Case {
-    mechanism: Mechanism,
-    velocity: Vec<f64>,
-    acceleration: Vec<f64>,
-    moves: Vec<(Geometry, PathMode)>,
-    feed_mm_s: f64,
-}
-
-fn xyz(x: f64, y: f64, z: f64) -> Vector {
+pub(crate) fn xyz(x: f64, y: f64, z: f64) -> Vector {
     [x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 }
 
-fn moma() -> Mechanism {
+pub(crate) fn moma() -> Mechanism {
     Mechanism::Moma(Moma::new(&MomaConfiguration::A.into()).unwrap())
 }
 
-fn identity(axes: &[Axis]) -> Mechanism {
+pub(crate) fn identity(axes: &[Axis]) -> Mechanism {
     Mechanism::Cartesian(pkm_kins::cartesian::Cartesian::new(AxisSet::new(axes)).unwrap())
 }
 
-fn polyline(points: &[Vector], mode: PathMode) -> Vec<(Geometry, PathMode)> {
+pub(crate) fn polyline(points: &[Vector], mode: PathMode) -> Vec<(Geometry, PathMode)> {
     points.windows(2).filter_map(|p| Line::new(p[0], p[1])).map(|line| (Geometry::Line(line), mode)).collect()
 }
 
-fn blend(p_mm: f64) -> PathMode {
+pub(crate) fn blend(p_mm: f64) -> PathMode {
     PathMode::Blend(Tolerance { length_mm: p_mm, angle_rad: 1e-3 })
 }
 
@@ -73,113 +64,8 @@ fn line(a: Vector, b: Vector) -> Vec<(Geometry, PathMode)> {
     polyline(&[a, b], PathMode::ExactPath)
 }
 
-/// What happens during a run, by tick.
-#[derive(Clone, Copy, PartialEq)]
-enum Disturbance {
-    None,
-    RandomOverride,
-    HoldThirds,
-}
-
-struct Trace {
-    duration_s: f64,
-    /// Worst joint velocity and acceleration, in shares of the limit.
-    velocity: f64,
-    acceleration: f64,
-    end: Vector,
-}
-
-fn random(state: &mut u64) -> u64 {
-    *state ^= *state << 13;
-    *state ^= *state >> 7;
-    *state ^= *state << 17;
-    *state
-}
-
-fn drive(case: &Case, period_s: f64, disturbance: Disturbance, one_per_tick: bool) -> Trace {
-    let joint_limits: Vec<JointLimits> = (0..case.velocity.len())
-        .map(|i| JointLimits {
-            range: JointRange { min: -1000.0, max: 1000.0 },
-            max_velocity: case.velocity[i],
-            max_acceleration: case.acceleration[i],
-        })
-        .collect();
-    let start = Pose::from_array(case.moves[0].0.at(0.0).position);
-    let limits = Limits::new(&joint_limits, &[], 0.0).unwrap();
-    let settings = Settings { servo_period_s: period_s, substeps: 1 };
-    let mut planner = TestPlanner::new(case.mechanism, limits, settings, start).unwrap();
-    let n = case.mechanism.joint_count();
-    let mut rows = vec![planner.setpoint().joints; 3];
-    let mut queue = case.moves.iter();
-    let mut next = queue.next();
-    let (mut ticks, mut velocity, mut acceleration) = (0u64, 0.0_f64, 0.0_f64);
-    let mut seed = 0x9e37_79b9_7f4a_7c15;
-    let per_ms = (1e-3 / period_s).round() as u64;
-    loop {
-        while let Some((geometry, mode)) = next {
-            let feed = Feed { speed: case.feed_mm_s, group: FeedGroup::Xyz };
-            let step = Move {
-                geometry: *geometry,
-                feed,
-                rapid: case.feed_mm_s.is_infinite(),
-                mode: *mode,
-                span: Default::default(),
-            };
-            match planner.push(step) {
-                Ok(_) => next = queue.next(),
-                Err(PushError::Full) => break,
-                Err(PushError::Plan(e)) => panic!("{e:?}"),
-            }
-            if next.is_none() {
-                planner.finish();
-            }
-            if one_per_tick {
-                break;
-            }
-        }
-        match disturbance {
-            Disturbance::None => {}
-            Disturbance::RandomOverride => {
-                if random(&mut seed) % (3 * per_ms) == 0 {
-                    let factor = (random(&mut seed) % 121) as f64 / 100.0;
-                    assert!(planner.set_feed_override(factor) && planner.set_rapid_override(factor));
-                }
-            }
-            Disturbance::HoldThirds => planner.hold(ticks / per_ms % 300 >= 200),
-        }
-        let setpoint = planner.tick().unwrap();
-        ticks += 1;
-        rows.push(setpoint.joints);
-        let k = rows.len();
-        for j in 0..n {
-            let (a, b, c) = (rows[k - 3][j], rows[k - 2][j], rows[k - 1][j]);
-            velocity = velocity.max(((c - b) / period_s).abs() / case.velocity[j]);
-            acceleration =
-                acceleration.max(((c - 2.0 * b + a) / (period_s * period_s)).abs() / case.acceleration[j]);
-        }
-        if setpoint.state == State::Idle && next.is_none() {
-            break;
-        }
-        assert!(ticks < 4_000_000, "never ends at {:?}", setpoint.pose);
-    }
-    Trace {
-        duration_s: (ticks - 1) as f64 * period_s,
-        velocity,
-        acceleration,
-        end: planner.setpoint().pose.to_array(),
-    }
-}
-
-/// The planner with its queues is larger than a test thread's stack.
 fn judge(id: &str, case: &Case, t_ref_s: f64) {
-    std::thread::scope(|scope| {
-        let run = std::thread::Builder::new()
-            .stack_size(64 << 20)
-            .spawn_scoped(scope, || judge_here(id, case, t_ref_s));
-        if let Err(panic) = run.unwrap().join() {
-            std::panic::resume_unwind(panic);
-        }
-    });
+    with_stack(|| judge_here(id, case, t_ref_s));
 }
 
 fn judge_here(id: &str, case: &Case, t_ref_s: f64) {
