@@ -5,4 +5,5 @@ mod kins;
 mod machines;
 mod programs;
 mod run;
+mod smoke;
 mod support;

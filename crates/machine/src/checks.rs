@@ -2,6 +2,7 @@
 
 use crate::file::{Nanoseconds, Number};
 use crate::source::Findings;
+use pkm_kins::{JointKind, JointRange, maths};
 use std::ops::RangeInclusive;
 use toml::Spanned;
 
@@ -79,4 +80,31 @@ pub(crate) fn identifier(key: &str, name: &Spanned<String>, findings: &mut Findi
         return None;
     }
     Some(text.clone())
+}
+
+/// A range from its two ends; both must be there, finite and in order.
+pub(crate) fn range(
+    min: Option<(String, &Number)>,
+    max: Option<(String, &Number)>,
+    kind: JointKind,
+    findings: &mut Findings<'_>,
+) -> Option<JointRange> {
+    let low = min.as_ref().and_then(|(key, number)| finite(key, number, findings));
+    let high = max.as_ref().and_then(|(key, number)| finite(key, number, findings));
+    let (low, high) = (low?, high?);
+    if low >= high {
+        let ((min_key, _), (max_key, number)) = (min?, max?);
+        let message = format!("{min_key} = {low} is not below {max_key} = {high}");
+        findings.error(
+            "machine-range",
+            number.span(),
+            message,
+            "the upper end must be larger than the lower",
+        );
+        return None;
+    }
+    Some(match kind {
+        JointKind::Linear => JointRange { min: low, max: high },
+        JointKind::Rotary => JointRange { min: maths::radians(low), max: maths::radians(high) },
+    })
 }

@@ -14,6 +14,7 @@
 mod checks;
 pub mod drivers;
 pub mod file;
+mod joint;
 pub mod kinematics;
 mod load;
 mod machine;

@@ -1,14 +1,14 @@
 //! A machine that can run: every number finite and in range, every joint matched to the mechanism, home inside the travel.
 
-use crate::checks::{finite, identifier, integer, not_negative, positive};
-use crate::drivers::{self, DriverTiming, StepTiming};
-use crate::file::{self, MachineFile, Nanoseconds, Number};
+use crate::checks::{finite, identifier, integer, not_negative, positive, range};
+use crate::drivers::{DriverTiming, StepTiming};
+use crate::file::{self, MachineFile, Number};
+use crate::joint::joints;
 use crate::source::Findings;
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Axis, JointKind, JointRange, Kinematics, Pose, maths};
-use std::ops::{Range, RangeInclusive};
-use toml::Spanned;
+use std::ops::RangeInclusive;
 
 /// A validated machine. Units: mm, **radians**, seconds, and ns where the name says so.
 #[derive(Debug, Clone)]
@@ -110,7 +110,6 @@ pub struct SingularityGuard {
 
 const SERVO_PERIOD_NS: RangeInclusive<i64> = 10_000..=100_000_000;
 const TIMER_PERIOD_NS: RangeInclusive<i64> = 1..=1_000_000;
-const DRIVER_TIME_NS: RangeInclusive<i64> = 1..=1_000_000_000;
 const DEFAULT_TIMER_PERIOD_NS: u64 = 100;
 const DEFAULT_GUARD: f64 = 0.001;
 const DEFAULT_WARN: f64 = 0.05;
@@ -210,228 +209,6 @@ fn singularity(tables: &file::Tables, findings: &mut Findings<'_>) -> Option<Sin
     let guard = bound("singularity.guard", &tables.singularity.guard, DEFAULT_GUARD);
     let warn = bound("singularity.warn", &tables.singularity.warn, DEFAULT_WARN);
     Some(SingularityGuard { guard: guard?, warn: warn? })
-}
-
-fn joints(
-    tables: &file::Tables,
-    mechanism: &Mechanism,
-    timer_period_ns: u64,
-    findings: &mut Findings<'_>,
-) -> Option<Vec<Joint>> {
-    let written = tables.joint.get_ref();
-    let count = mechanism.joint_count();
-    if written.len() != count {
-        let message = format!("{} [[joint]] tables, but the mechanism has {count} joints", written.len());
-        let span = written.get(count).map_or(tables.joint.span(), Spanned::span);
-        findings.error(
-            "machine-joint-count",
-            span,
-            message,
-            "write one [[joint]] table per joint, in joint order",
-        );
-        return None;
-    }
-    for (index, joint) in written.iter().enumerate() {
-        let name = &joint.get_ref().name;
-        if written[..index].iter().any(|other| other.get_ref().name.get_ref() == name.get_ref()) {
-            let message = format!("two joints are named `{}`", name.get_ref());
-            findings.error(
-                "machine-repeated-name",
-                name.span(),
-                message,
-                "give every joint a name of its own",
-            );
-        }
-    }
-    let built: Vec<Option<Joint>> = written
-        .iter()
-        .enumerate()
-        .map(|(index, joint)| {
-            let driver = joint.get_ref().driver.as_ref().or(tables.driver.as_ref());
-            build_joint(joint, mechanism.joint_kind(index), driver, timer_period_ns, findings)
-        })
-        .collect();
-    built.into_iter().collect()
-}
-
-fn build_joint(
-    joint: &Spanned<file::Joint>,
-    kind: JointKind,
-    driver: Option<&Spanned<file::Driver>>,
-    timer_period_ns: u64,
-    findings: &mut Findings<'_>,
-) -> Option<Joint> {
-    let span = joint.span();
-    let joint = joint.get_ref();
-    let name = identifier("joint name", &joint.name, findings);
-    let label = format!("joint {}: ", joint.name.get_ref());
-    let linear = [
-        ("min_mm", &joint.min_mm),
-        ("max_mm", &joint.max_mm),
-        ("max_velocity_mm_s", &joint.max_velocity_mm_s),
-        ("max_acceleration_mm_s2", &joint.max_acceleration_mm_s2),
-        ("steps_per_mm", &joint.steps_per_mm),
-    ];
-    let rotary = [
-        ("min_deg", &joint.min_deg),
-        ("max_deg", &joint.max_deg),
-        ("max_velocity_deg_s", &joint.max_velocity_deg_s),
-        ("max_acceleration_deg_s2", &joint.max_acceleration_deg_s2),
-        ("steps_per_deg", &joint.steps_per_deg),
-    ];
-    let (fields, foreign, what) = match kind {
-        JointKind::Linear => (linear, rotary, "linear: its keys end in _mm"),
-        JointKind::Rotary => (rotary, linear, "rotary: its keys end in _deg"),
-    };
-    for (key, number) in foreign {
-        if let Some(number) = number {
-            let message = format!("{label}`{key}`, but the joint is {what}");
-            findings.error("machine-unit", number.span(), message, "use the key of the other unit");
-        }
-    }
-    let [min, max, velocity, acceleration, steps] = fields.map(|(key, number)| {
-        if number.is_none() {
-            let message = format!("{label}`{key}` is missing");
-            findings.error("machine-missing-key", span.clone(), message, "add it to this [[joint]] table");
-        }
-        Some((format!("{label}{key}"), number.as_ref()?))
-    });
-    let range = range(min, max, kind, findings);
-    let mut positive_of =
-        |field: Option<(String, &Number)>| field.and_then(|(key, number)| positive(&key, number, findings));
-    let (max_velocity, max_acceleration) = (positive_of(velocity.clone()), positive_of(acceleration));
-    let steps_per_unit = positive_of(steps);
-    let (driver, timing) = build_driver(&label, driver, &span, timer_period_ns, findings).unzip();
-    if let (Some(per_second), Some(per_unit), Some(timing), Some((key, number))) =
-        (max_velocity, steps_per_unit, &timing, &velocity)
-    {
-        let shortest_ns = timing.on_grid(timer_period_ns).shortest_pulse_interval_ns();
-        let fastest = 1e9 / shortest_ns as f64;
-        if per_second * per_unit > fastest {
-            let message = format!(
-                "{key} = {per_second} needs {} steps/s, but the driver timing allows {fastest:.0} \
-                 ({shortest_ns} ns from pulse to pulse)",
-                per_second * per_unit
-            );
-            let help = format!(
-                "at most {} at {per_unit} steps per unit; or fewer steps, or a faster driver",
-                fastest / per_unit
-            );
-            findings.error("machine-step-rate", number.span(), message, &help);
-        }
-    }
-    let face = |value: f64, per_unit: bool| match (kind, per_unit) {
-        (JointKind::Linear, _) => value,
-        (JointKind::Rotary, false) => maths::radians(value),
-        (JointKind::Rotary, true) => maths::degrees(value),
-    };
-    Some(Joint {
-        name: name?,
-        kind,
-        range: range?,
-        max_velocity: face(max_velocity?, false),
-        max_acceleration: face(max_acceleration?, false),
-        steps_per_unit: face(steps_per_unit?, true),
-        timing: timing?,
-        driver: driver?,
-    })
-}
-
-/// The driver with its minima, and the times to use: as configured, or the minima; never shorter than these.
-fn build_driver(
-    label: &str,
-    driver: Option<&Spanned<file::Driver>>,
-    joint_span: &Range<usize>,
-    timer_period_ns: u64,
-    findings: &mut Findings<'_>,
-) -> Option<(DriverTiming, StepTiming)> {
-    let known = || drivers::DRIVERS.map(|(name, _)| name).join(", ");
-    let Some(driver) = driver else {
-        let help = format!("add [driver] with `model` ({}) or `minimum`", known());
-        findings.error("machine-driver", joint_span.clone(), format!("{label}no driver is stated"), &help);
-        return None;
-    };
-    let span = driver.span();
-    let driver = driver.get_ref();
-    let (model, minimum) = match (&driver.model, &driver.minimum) {
-        (Some(model), None) => {
-            let Some((model, minimum)) = drivers::find(model.get_ref()) else {
-                let message = format!("{label}no data sheet of a driver `{}` is known", model.get_ref());
-                let help = format!("known are {}; for others give `minimum` in place of `model`", known());
-                findings.error("machine-driver", model.span(), message, &help);
-                return None;
-            };
-            (model, minimum)
-        }
-        (None, Some(minimum)) => {
-            let written = minimum.get_ref();
-            let mut time = |key: &str, time: &Nanoseconds| {
-                integer(&format!("{label}driver.minimum.{key}"), time, DRIVER_TIME_NS, findings)
-            };
-            let step_length_ns = time("step_length_ns", &written.step_length_ns);
-            let step_space_ns = time("step_space_ns", &written.step_space_ns);
-            let direction_setup_ns = time("direction_setup_ns", &written.direction_setup_ns);
-            let direction_hold_ns = time("direction_hold_ns", &written.direction_hold_ns);
-            let minimum = StepTiming {
-                step_length_ns: step_length_ns?,
-                step_space_ns: step_space_ns?,
-                direction_setup_ns: direction_setup_ns?,
-                direction_hold_ns: direction_hold_ns?,
-            };
-            ("custom", minimum)
-        }
-        _ => {
-            let help = format!("known models are {}", known());
-            findings.error(
-                "machine-driver",
-                span,
-                format!("{label}driver needs either `model` or `minimum`"),
-                &help,
-            );
-            return None;
-        }
-    };
-    let usual = minimum.on_grid(timer_period_ns);
-    let mut time = |key: &str, written: &Option<Nanoseconds>, minimum_ns: u64, usual_ns: u64| {
-        let Some(written) = written else { return Some(usual_ns) };
-        let time_ns = integer(&format!("{label}driver.{key}"), written, DRIVER_TIME_NS, findings)?;
-        if time_ns < minimum_ns {
-            let message = format!(
-                "{label}driver.{key} = {time_ns} ns is shorter than the {minimum_ns} ns that {model} needs"
-            );
-            findings.error(
-                "machine-driver-timing",
-                written.span(),
-                message,
-                &format!("write {usual_ns} or more"),
-            );
-            return None;
-        }
-        Some(time_ns)
-    };
-    let step_length_ns =
-        time("step_length_ns", &driver.step_length_ns, minimum.step_length_ns, usual.step_length_ns);
-    let step_space_ns =
-        time("step_space_ns", &driver.step_space_ns, minimum.step_space_ns, usual.step_space_ns);
-    let direction_setup_ns = time(
-        "direction_setup_ns",
-        &driver.direction_setup_ns,
-        minimum.direction_setup_ns,
-        usual.direction_setup_ns,
-    );
-    let direction_hold_ns = time(
-        "direction_hold_ns",
-        &driver.direction_hold_ns,
-        minimum.direction_hold_ns,
-        usual.direction_hold_ns,
-    );
-    let timing = StepTiming {
-        step_length_ns: step_length_ns?,
-        step_space_ns: step_space_ns?,
-        direction_setup_ns: direction_setup_ns?,
-        direction_hold_ns: direction_hold_ns?,
-    };
-    Some((DriverTiming { model: model.to_owned(), minimum }, timing))
 }
 
 fn axes(tables: &file::Tables, mechanism: &Mechanism, findings: &mut Findings<'_>) -> Vec<AxisLimits> {
@@ -581,31 +358,4 @@ fn distance(a: &Pose, b: &Pose) -> f64 {
 fn letters(mechanism: &Mechanism) -> String {
     let letters: Vec<String> = mechanism.axes().iter().map(|axis| axis.letter().to_string()).collect();
     letters.join(" ")
-}
-
-/// A range from its two ends; both must be there, finite and in order.
-fn range(
-    min: Option<(String, &Number)>,
-    max: Option<(String, &Number)>,
-    kind: JointKind,
-    findings: &mut Findings<'_>,
-) -> Option<JointRange> {
-    let low = min.as_ref().and_then(|(key, number)| finite(key, number, findings));
-    let high = max.as_ref().and_then(|(key, number)| finite(key, number, findings));
-    let (low, high) = (low?, high?);
-    if low >= high {
-        let ((min_key, _), (max_key, number)) = (min?, max?);
-        let message = format!("{min_key} = {low} is not below {max_key} = {high}");
-        findings.error(
-            "machine-range",
-            number.span(),
-            message,
-            "the upper end must be larger than the lower",
-        );
-        return None;
-    }
-    Some(match kind {
-        JointKind::Linear => JointRange { min: low, max: high },
-        JointKind::Rotary => JointRange { min: maths::radians(low), max: maths::radians(high) },
-    })
 }

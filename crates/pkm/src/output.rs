@@ -42,8 +42,16 @@ impl Folder {
     /// It cannot be made.
     pub(crate) fn create(&self, name: &str) -> Result<Pending, Failure> {
         let path = self.path.join(name);
+        if path.is_dir() {
+            return Err(failure(&path, &io::ErrorKind::IsADirectory.into()));
+        }
         let file = AtomicWriteFile::open(&path).map_err(|error| failure(&path, &error))?;
         Ok(Pending { path, file: BufWriter::new(file), failed: Arc::clone(&self.failed) })
+    }
+
+    /// A failure to write one of its files.
+    pub(crate) fn failure(&self, name: &str, error: &io::Error) -> Failure {
+        failure(&self.path.join(name), error)
     }
 
     /// Set as soon as writing to any file of the folder has failed.

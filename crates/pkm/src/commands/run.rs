@@ -4,7 +4,7 @@ use crate::cli::{Format, Run};
 use crate::commands::program::{Job, Refused};
 use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
-use crate::output::{self, Folder, Pending};
+use crate::output::{Folder, Pending};
 use crate::render::diagnostics::Messages;
 use crate::render::summary;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -13,7 +13,6 @@ use pkm_run::{Options, Progress, Summary};
 use pkm_stepgen::Edge;
 use std::io::{IsTerminal, Write, stderr, stdout};
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 /// The files that see the run.
@@ -111,7 +110,7 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
 /// Ends all files and puts them in place; the first error of any of them is the answer.
 fn save(folder: Folder, files: Files, mut summary_file: Pending, summary: &Summary) -> Result<(), Failure> {
     let mut done = Vec::new();
-    let told = |name: &str, error: &std::io::Error| output::failure(&PathBuf::from(name), error);
+    let told = |name: &str, error: &std::io::Error| folder.failure(name, error);
     if let Some(vcd) = files.vcd {
         done.push(vcd.finish().map_err(|error| told("steps.vcd", &error))?);
     }
