@@ -19,7 +19,15 @@ fn setpoints() -> Vec<Setpoint> {
     (1..=TICKS as u64).map(|tick| source.next(tick).unwrap_or_default()).collect()
 }
 
+/// `cargo bench ... -- WORD` measures what has the word in its name.
+fn wanted(name: &str) -> bool {
+    std::env::args().nth(1).is_none_or(|word| word.starts_with('-') || name.contains(&word))
+}
+
 fn run(name: &str, setpoints: &[Setpoint], observe: impl Fn(&Simulation) -> Vec<Box<dyn Observer>>) {
+    if !wanted(name) {
+        return;
+    }
     let mut best = f64::INFINITY;
     let mut steps = 0;
     for _ in 0..5 {
@@ -43,6 +51,9 @@ fn run(name: &str, setpoints: &[Setpoint], observe: impl Fn(&Simulation) -> Vec<
 }
 
 fn generator(name: &str, amplitude: f64) {
+    if !wanted(name) {
+        return;
+    }
     let timing = PulseTimingNs { step_length: 50, step_space: 50, dir_setup: 50, dir_hold: 50 };
     let motion: Vec<(f64, f64)> = (1..=TICKS as u64)
         .map(|tick| {

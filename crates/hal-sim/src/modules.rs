@@ -6,7 +6,7 @@ use crate::components::stepgen::{Stepgen, StepgenChannel, StepgenError};
 use crate::components::*;
 use crate::hal::{Hal, HalError};
 use pkm_kins::{Axis, AxisSet, JointKind, JointRange, MAX_JOINTS};
-use pkm_stepgen::PulseTimingNs;
+use pkm_stepgen::{PulseTimingNs, StepType};
 use std::fmt;
 
 /// Most instances or channels of one module.
@@ -226,23 +226,30 @@ fn motmod(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {
 }
 
 fn stepgen(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {
-    let mut count = None;
+    let mut types = None;
     for choice in choices {
         let entries: Vec<&str> = choice.value.split(',').collect();
         match choice.key {
             "step_type" if entries.len() > MAX_COUNT => return choice.bad("at most 16 channels"),
-            "step_type" if entries.iter().all(|entry| *entry == "0") => count = Some(entries.len()),
-            "step_type" => return choice.bad("0 (step and direction) for each channel"),
+            "step_type" => {
+                let step_type = |entry: &&str| entry.parse().ok().and_then(StepType::from_number);
+                types = entries.iter().map(step_type).collect::<Option<Vec<_>>>();
+                if types.is_none() {
+                    return choice.bad("a number from 0 to 14 for each channel");
+                }
+            }
             "ctrl_type" if entries.iter().all(|entry| *entry == "p") => {}
             "ctrl_type" => return choice.bad("p (position) for each channel"),
             _ => return choice.unknown(),
         }
     }
-    let count = count.ok_or(LoadError::Missing("step_type"))?;
+    let types = types.ok_or(LoadError::Missing("step_type"))?;
     // LinuxCNC's defaults: scale 1, the shortest times
     let timing = PulseTimingNs { step_length: 1, step_space: 1, dir_setup: 1, dir_hold: 1 };
-    let channel = StepgenChannel { position_scale: 1.0, timing, start: 0.0, enabled: false };
-    Stepgen::load(hal, &vec![channel; count]).map_err(|error| match error {
+    let channel =
+        |step_type| StepgenChannel { position_scale: 1.0, timing, start: 0.0, enabled: false, step_type };
+    let channels: Vec<StepgenChannel> = types.into_iter().map(channel).collect();
+    Stepgen::load(hal, &channels).map_err(|error| match error {
         StepgenError::Hal(error) => LoadError::Hal(error),
         StepgenError::Channel(..) => LoadError::Missing("step_type"),
     })

@@ -12,7 +12,7 @@ use crate::hal::{Hal, HalError};
 use crate::values::{BitPin, FloatPin};
 use pkm_kins::maths::{PI, radians};
 use pkm_kins::{AxisSet, ForwardError, JointKind, JointRange, Joints, Kinematics, MAX_JOINTS, Pose};
-use pkm_stepgen::{Edge, EdgeError, Line, Period, PulseTiming, PulseTimingNs, StepGenerator};
+use pkm_stepgen::{Edge, EdgeError, Line, Period, PulseTiming, PulseTimingNs, StepGenerator, StepType};
 use std::any::Any;
 use std::fmt;
 
@@ -240,6 +240,7 @@ impl Simulation {
                 timing: joint.timing,
                 start,
                 enabled: true,
+                step_type: StepType::StepDir,
             });
             let start = at_start.count();
             drivers.push(DriverChannel { minimum: joint.driver_minimum, start });

@@ -145,7 +145,7 @@ impl<W: Write> Observer for StreamWriter<W> {
                 self.joints[n].positive = edge.level;
             }
             Line::Step if edge.level => self.joints[n].times.push(edge.time),
-            Line::Step => {}
+            _ => {}
         }
     }
 

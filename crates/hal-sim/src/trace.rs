@@ -188,7 +188,7 @@ impl<W: Write> TraceWriter<W> {
                     Line::Step if edge.level => {
                         between.states[n].count += if between.positive[n] { 1 } else { -1 };
                     }
-                    Line::Step => {}
+                    _ => {}
                 }
             }
             if i == between.substeps {

@@ -233,8 +233,8 @@ fn what_is_wrong_is_named_with_its_place() {
         ("loadrt and2", "line 5, column 8: the name 'and2.0.in0' is taken"),
         ("loadrt stepgen", "line 5, column 8: the option 'step_type' is missing"),
         (
-            "loadrt stepgen step_type=0,2",
-            "line 5, column 16: the option should be 0 (step and direction) for each channel",
+            "loadrt stepgen step_type=0,15",
+            "line 5, column 16: the option should be a number from 0 to 14 for each channel",
         ),
         ("loadrt threads name1=u", "line 5, column 8: the option 'period1' is missing"),
         (

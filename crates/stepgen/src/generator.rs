@@ -2,6 +2,7 @@
 
 use crate::conditioner::{Conditioner, ConditionerReport, Edge};
 use crate::edges::{Crossings, Cubic, EdgeError};
+use crate::step_types::StepType;
 use crate::timing::{Period, PulseTiming};
 
 /// The step generator of one joint with step/dir lines.
@@ -32,6 +33,21 @@ impl StepGenerator {
         }
         let crossings = Crossings::new(position * steps_per_unit)?;
         Ok(Self { steps_per_unit, crossings, conditioner: Conditioner::new(joint, timing) })
+    }
+
+    /// The same for another step type.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_type(
+        joint: u8,
+        steps_per_unit: f64,
+        timing: PulseTiming,
+        position: f64,
+        step_type: StepType,
+    ) -> Result<Self, EdgeError> {
+        let generator = Self::new(joint, steps_per_unit, timing, position)?;
+        Ok(Self { conditioner: Conditioner::with_type(joint, timing, step_type), ..generator })
     }
 
     /// Moves to `position` (mm or rad), reached with `velocity` (mm/s or rad/s) at the end of `period`. Periods follow

@@ -31,10 +31,12 @@ pub mod conditioner;
 pub mod edges;
 pub mod generator;
 pub mod runs;
+pub mod step_types;
 pub mod timing;
 
 pub use conditioner::{Conditioner, ConditionerReport, Edge, Line};
 pub use edges::{Crossings, EdgeError};
 pub use generator::StepGenerator;
 pub use runs::{Run, RunError, RunLimits};
+pub use step_types::StepType;
 pub use timing::{Period, PulseTiming, PulseTimingNs, TimingError};

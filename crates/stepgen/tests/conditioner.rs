@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Random, cases};
-use pkm_stepgen::{Conditioner, Edge, Line, Period, PulseTimingNs, StepGenerator};
+use pkm_stepgen::{Conditioner, Edge, Line, Period, PulseTimingNs, StepGenerator, StepType};
 
 /// Judges one joint's edges in ticks; shares nothing with the conditioner.
 fn judge(edges: &[Edge], timing: &PulseTimingNs) -> Result<i64, String> {
@@ -29,6 +29,9 @@ fn judge(edges: &[Edge], timing: &PulseTimingNs) -> Result<i64, String> {
                     return Err(format!("step length at {edge:?}"));
                 }
                 (fall, high) = (Some(edge.time), false);
+            }
+            (Line::Up | Line::Down | Line::Phase(_), _) => {
+                return Err(format!("another step type: {edge:?}"));
             }
             (Line::Dir, level) => {
                 if high || level == forward || since(fall) < timing.dir_hold {
@@ -155,4 +158,72 @@ fn a_backlog_ends_in_an_error() {
         period = period.next();
     }
     assert!(matches!(result, Err(pkm_stepgen::EdgeError::Late { .. })), "{result:?}");
+}
+
+/// Random steps through a conditioner of some type: its edges, and steps forward less steps back.
+fn random_steps(seed: u64, timing: &PulseTimingNs, step_type: StepType) -> (Vec<Edge>, i64) {
+    let mut random = Random::new(seed);
+    let mut conditioner = Conditioner::with_type(0, timing.ticks(1).unwrap(), step_type);
+    let (mut edges, mut time, mut net) = (Vec::new(), 1, 0);
+    for _ in 0..300 {
+        time += random.below(50_000);
+        let forward = random.below(4) > 0;
+        net += if forward { 1 } else { -1 };
+        conditioner.step(time, forward, time - random.below(time.min(40_000)), &mut |edge| edges.push(edge));
+    }
+    (edges, net)
+}
+
+#[test]
+fn up_and_down_pulses_count_back() {
+    for seed in 0..cases(200) {
+        let timing = timing(&mut Random::new(seed + 1000));
+        let (edges, net) = random_steps(seed, &timing, StepType::UpDown);
+        let (mut count, mut last_fall, mut last_line) = (0, None::<u64>, None);
+        for pair in edges.chunks(2) {
+            let [rise, fall] = pair else { panic!("seed {seed}: half a pulse") };
+            assert!(rise.line == fall.line && rise.level && !fall.level, "seed {seed}");
+            assert_eq!(fall.time - rise.time, timing.step_length, "seed {seed}");
+            let gap = last_fall.map_or(u64::MAX, |last| rise.time - last);
+            assert!(gap >= timing.step_space, "seed {seed}");
+            if last_line.is_some_and(|line| line != rise.line) {
+                assert!(gap >= timing.dir_hold + timing.dir_setup, "seed {seed}");
+            }
+            count += match rise.line {
+                Line::Up => 1,
+                Line::Down => -1,
+                _ => panic!("seed {seed}: {rise:?}"),
+            };
+            (last_fall, last_line) = (Some(fall.time), Some(rise.line));
+        }
+        assert_eq!(count, net, "seed {seed}");
+    }
+}
+
+#[test]
+fn phases_follow_their_tables_and_count_back() {
+    for number in 2..=14 {
+        let step_type = StepType::from_number(number).unwrap();
+        let StepType::Phases(phases) = step_type else { panic!() };
+        for seed in 0..cases(20) {
+            let timing = timing(&mut Random::new(seed + 2000));
+            let (edges, net) = random_steps(seed, &timing, step_type);
+            let (mut count, mut levels, mut last) = (0_i64, 0_u8, None::<u64>);
+            let mut rest = edges.as_slice();
+            while let Some(first) = rest.first() {
+                let changes = rest.iter().take_while(|edge| edge.time == first.time).count();
+                for edge in &rest[..changes] {
+                    let Line::Phase(line) = edge.line else { panic!("{edge:?}") };
+                    assert_ne!(levels >> line & 1 == 1, edge.level, "no change: {edge:?}");
+                    levels ^= 1 << line;
+                }
+                rest = &rest[changes..];
+                assert!(last.is_none_or(|last| first.time >= last + timing.step_length), "type {number}");
+                last = Some(first.time);
+                let step = [1, -1].into_iter().find(|step| phases.state(count + step) == levels);
+                count += step.unwrap_or_else(|| panic!("type {number}: {levels:b} after step {count}"));
+            }
+            assert_eq!(count, net, "type {number} seed {seed}");
+        }
+    }
 }

@@ -6,6 +6,7 @@
 //! | `stepgen.N.velocity-cmd`     | float in  | velocity there, mm/s or degrees/s; not linked: straight lines  |
 //! | `stepgen.N.enable`           | bit in    | false: no step begins; the generator stands where the steps stand |
 //! | `stepgen.N.step`, `.dir`     | bit out   | the lines, with their edges inside the period; dir high = positive |
+//! | `.up`, `.down`, `.phase-a` … | bit out   | in their place, for other step types                           |
 //! | `stepgen.N.counts`           | s32 out   | steps so far (wraps)                                           |
 //! | `stepgen.N.position-fb`      | float out | counts / scale                                                 |
 //! | `stepgen.N.position-scale`   | float rw  | steps per mm or degree, not 0                                  |
@@ -20,7 +21,8 @@
 use crate::component::{Component, Fault, PinIndex, PinName, Tick};
 use crate::hal::{Hal, HalError, Role};
 use crate::values::{BitPin, EdgeQueue, FloatPin, LineEdge, S32Pin, U32Pin, Values};
-use pkm_stepgen::{Edge, EdgeError, Line, PulseTimingNs, StepGenerator};
+use pkm_stepgen::step_types::MAX_PHASES;
+use pkm_stepgen::{Edge, EdgeError, Line, PulseTimingNs, StepGenerator, StepType};
 
 /// One channel as configured.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,6 +35,8 @@ pub struct StepgenChannel {
     pub start: f64,
     /// Whether the generator is enabled while `enable` is not linked.
     pub enabled: bool,
+    /// What a step does to the lines.
+    pub step_type: StepType,
 }
 
 #[derive(Debug, Clone)]
@@ -40,8 +44,9 @@ struct Pins {
     position_cmd: FloatPin,
     velocity_cmd: FloatPin,
     enable: BitPin,
-    step: BitPin,
-    dir: BitPin,
+    step_type: StepType,
+    /// step and dir, up and down, or phases; the rest repeats the first.
+    lines: [BitPin; MAX_PHASES],
     counts: S32Pin,
     position_fb: FloatPin,
     max_delay: U32Pin,
@@ -84,8 +89,14 @@ impl Stepgen {
         let mut with_pins = Vec::new();
         for (n, channel) in channels.iter().enumerate() {
             let timing = channel.timing.ticks(timer_period_ns).map_err(HalError::from)?;
-            let generator = StepGenerator::new(n as u8, channel.position_scale, timing, channel.start)
-                .map_err(|error| StepgenError::Channel(n, error))?;
+            let generator = StepGenerator::with_type(
+                n as u8,
+                channel.position_scale,
+                timing,
+                channel.start,
+                channel.step_type,
+            )
+            .map_err(|error| StepgenError::Channel(n, error))?;
             let name = |pin: &str| format!("stepgen.{n}.{pin}");
             let owner = "stepgen";
             let counts = generator.count() as i32;
@@ -94,12 +105,21 @@ impl Stepgen {
             let PulseTimingNs { step_length, step_space, dir_setup, dir_hold } = channel.timing;
             let times = [step_length, step_space, dir_setup, dir_hold]
                 .map(|time| u32::try_from(time).unwrap_or(u32::MAX));
+            let line_names = match channel.step_type {
+                StepType::StepDir => ["step", "dir"].as_slice(),
+                StepType::UpDown => &["up", "down"],
+                StepType::Phases(phases) => &PHASES[..phases.lines()],
+            };
+            let mut lines = [hal.new_bit(owner, &name(line_names[0]), Role::Out, false)?; MAX_PHASES];
+            for (line, line_name) in lines.iter_mut().zip(line_names).skip(1) {
+                *line = hal.new_bit(owner, &name(line_name), Role::Out, false)?;
+            }
             let pins = Pins {
                 position_cmd: hal.new_float(owner, &name("position-cmd"), Role::In, channel.start)?,
                 velocity_cmd: hal.new_float(owner, &name("velocity-cmd"), Role::In, 0.0)?,
                 enable: hal.new_bit(owner, &name("enable"), Role::In, channel.enabled)?,
-                step: hal.new_bit(owner, &name("step"), Role::Out, false)?,
-                dir: hal.new_bit(owner, &name("dir"), Role::Out, false)?,
+                step_type: channel.step_type,
+                lines,
                 counts: hal.new_s32(owner, &name("counts"), Role::Out, counts)?,
                 position_fb: hal.new_float(owner, &name("position-fb"), Role::Out, position)?,
                 max_delay: hal.new_u32(owner, &name("max-delay"), Role::ReadOnly, 0)?,
@@ -130,29 +150,33 @@ impl Stepgen {
             let enabled = values.bit(pins.enable);
             configure(generator, pins, values, self.timer_period_ns)
                 .map_err(|pin| Fault::Parameter { tick: tick.number, pin: parameter(n, pin) })?;
-            let mut steps = values.take_edges(pins.step);
-            let mut turns = values.take_edges(pins.dir);
-            steps.retire(start);
-            turns.retire(start);
+            let lines = &pins.lines[..pins.step_type.lines()];
+            let mut queues: [EdgeQueue; MAX_PHASES] = Default::default();
+            for (queue, line) in queues.iter_mut().zip(lines) {
+                *queue = values.take_edges(*line);
+                queue.retire(start);
+            }
             let result = if enabled {
-                let sink = |edge: Edge| match edge.line {
-                    Line::Step => steps.push(edge.time, edge.level),
-                    Line::Dir => turns.push(edge.time, edge.level),
-                };
+                let sink = |edge: Edge| queues[line_index(edge.line)].push(edge.time, edge.level);
                 let position = values.float(pins.position_cmd);
                 if values.float_is_linked(pins.velocity_cmd) {
                     generator.advance(position, values.float(pins.velocity_cmd), &tick.period, sink)
                 } else {
                     generator.advance_straight(position, &tick.period, sink)
                 }
-            } else {
+            } else if pins.step_type == StepType::StepDir {
                 // steps that were to come late do not come; a pulse that has begun ends
-                let missing = net_steps(&steps, &turns, values.bit(pins.dir));
-                steps.cut_after(start, values.bit(pins.step));
+                let [steps, turns, ..] = &mut queues;
+                let missing = net_steps(steps, turns, values.bit(pins.lines[1]));
+                steps.cut_after(start, values.bit(pins.lines[0]));
                 generator.stand_at(generator.count() - missing)
+            } else {
+                // of the other types, late steps still come
+                generator.stand_at(generator.count())
             };
-            values.put_edges(pins.step, steps, end);
-            values.put_edges(pins.dir, turns, end);
+            for (queue, line) in queues.into_iter().zip(lines) {
+                values.put_edges(*line, queue, end);
+            }
             result.map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error })?;
         }
         Ok(())
@@ -165,6 +189,17 @@ impl Stepgen {
             let delay = nanoseconds(generator.report().max_delay, self.timer_period_ns);
             values.set_u32(pins.max_delay, delay);
         }
+    }
+}
+
+const PHASES: [&str; MAX_PHASES] = ["phase-a", "phase-b", "phase-c", "phase-d", "phase-e"];
+
+/// Place of a line among the channel's.
+const fn line_index(line: Line) -> usize {
+    match line {
+        Line::Step | Line::Up => 0,
+        Line::Dir | Line::Down => 1,
+        Line::Phase(n) => n as usize,
     }
 }
 
