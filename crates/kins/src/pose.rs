@@ -51,6 +51,11 @@ impl AxisSet {
         Self(bits)
     }
 
+    /// The set with one axis more.
+    pub const fn with(self, axis: Axis) -> Self {
+        Self(self.0 | 1 << axis as u16)
+    }
+
     /// True if `axis` is in the set.
     pub const fn contains(self, axis: Axis) -> bool {
         self.0 & (1 << axis as u16) != 0

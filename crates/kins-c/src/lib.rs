@@ -1,0 +1,600 @@
+//! The kinematics for C.
+//!
+//! Two faces on the same code: `kinematicsForward` and `kinematicsInverse` in LinuxCNC's manner, for one machine chosen with
+//! `pkm_use`; and functions that take a machine as their first argument. Nothing allocates: a `PkmMachine` lives where the
+//! caller puts it and may be copied. Units: mm and **degrees** (also for rotary joints and their rates), as in G-code and in
+//! LinuxCNC's `EmcPose`. Every function accepts NULL and answers with a status; none panics.
+//!
+//! Safety of every function: pointers are NULL or point to a valid object of their type (arrays of the stated length) that
+//! nothing else writes during the call.
+#![no_std]
+#![allow(unsafe_code)] // the C face: raw pointers from the caller
+#![allow(clippy::missing_safety_doc)] // stated once, above
+
+#[cfg(feature = "std")]
+extern crate std;
+
+mod parameters;
+
+use core::fmt::{self, Write};
+use core::sync::atomic::{AtomicPtr, Ordering};
+pub use parameters::*;
+use pkm_kins::maths::{degrees, radians};
+use pkm_kins::*;
+
+/// Joints of the largest machine: the length of every joint array.
+pub const PKM_MAX_JOINTS: usize = 9;
+
+/// Words in a machine's storage.
+pub const PKM_MACHINE_WORDS: usize = 128;
+
+const _: () = assert!(PKM_MAX_JOINTS == MAX_JOINTS);
+const _: () = assert!(size_of::<Mechanism>() <= 8 * PKM_MACHINE_WORDS && align_of::<Mechanism>() <= 8);
+
+/// Marks a machine that one of the constructors made.
+const MADE: u64 = 0x706b_6d2d_6b69_6e73;
+
+/// A pose: mm and degrees, laid out as LinuxCNC's `EmcPose`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs)]
+pub struct PkmPose {
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    pub a: f64,
+    pub b: f64,
+    pub c: f64,
+    pub u: f64,
+    pub v: f64,
+    pub w: f64,
+}
+
+/// A machine, ready to run. Opaque: made by a constructor such as `pkm_moma`.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct PkmMachine {
+    made: u64,
+    words: [u64; PKM_MACHINE_WORDS],
+}
+
+/// What a call came to.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PkmStatus {
+    /// Done.
+    Ok = 0,
+    /// A pointer is NULL, or the machine was not made by a constructor.
+    Usage = -1,
+    /// The parameters make no mechanism.
+    Geometry = -2,
+    /// The pose has no joints, or the joints no pose.
+    Kinematics = -3,
+}
+
+/// Why a call failed: a code such as `unreachable:1` and a sentence, both ending in 0.
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[allow(missing_docs)]
+pub struct PkmError {
+    pub code: [core::ffi::c_char; 32],
+    pub message: [core::ffi::c_char; 224],
+}
+
+/// How near a pose is to a singularity: 1 far, 0 there.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PkmSingularity {
+    /// Smallest over the joints, type 1.
+    pub inverse: f64,
+    /// That joint, from 0.
+    pub inverse_joint: usize,
+    /// Type 2.
+    pub forward: f64,
+}
+
+/// A text of bounded length for C; what does not fit is left out.
+struct Text<'a> {
+    left: core::slice::IterMut<'a, core::ffi::c_char>,
+}
+
+impl Write for Text<'_> {
+    fn write_str(&mut self, s: &str) -> fmt::Result {
+        for byte in s.bytes() {
+            if self.left.len() > 1
+                && let Some(place) = self.left.next()
+            {
+                *place = byte.cast_signed() as core::ffi::c_char;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn put(place: &mut [core::ffi::c_char], text: impl fmt::Display) {
+    let mut buffer = Text { left: place.iter_mut() };
+    let _ = write!(buffer, "{text}");
+    if let Some(end) = buffer.left.next() {
+        *end = 0;
+    }
+}
+
+unsafe fn refuse(
+    error: *mut PkmError,
+    status: PkmStatus,
+    code: impl fmt::Display,
+    message: impl fmt::Display,
+) -> PkmStatus {
+    // SAFETY: NULL or valid for writing, by the contract of every function here.
+    if let Some(error) = unsafe { error.as_mut() } {
+        put(&mut error.code, code);
+        put(&mut error.message, message);
+    }
+    status
+}
+
+unsafe fn usage(error: *mut PkmError) -> PkmStatus {
+    // SAFETY: as above.
+    unsafe { refuse(error, PkmStatus::Usage, "usage", "a pointer is NULL or the machine was never made") }
+}
+
+/// The mechanism in a machine's storage.
+unsafe fn mechanism<'a>(machine: *const PkmMachine) -> Option<&'a Mechanism> {
+    // SAFETY: NULL or valid; `made` says that a constructor wrote a `Mechanism` into the words (size and alignment are asserted).
+    unsafe {
+        let machine = machine.as_ref()?;
+        (machine.made == MADE).then(|| &*machine.words.as_ptr().cast::<Mechanism>())
+    }
+}
+
+unsafe fn make(
+    machine: *mut PkmMachine,
+    error: *mut PkmError,
+    made: Result<Mechanism, GeometryError>,
+) -> PkmStatus {
+    match made {
+        // SAFETY: `machine` is not NULL (checked by the callers) and has room for a `Mechanism`.
+        Ok(mechanism) => unsafe {
+            machine.write(PkmMachine { made: MADE, words: [0; PKM_MACHINE_WORDS] });
+            (&raw mut (*machine).words).cast::<Mechanism>().write(mechanism);
+            PkmStatus::Ok
+        },
+        // SAFETY: as for `refuse`.
+        Err(why) => unsafe { refuse(error, PkmStatus::Geometry, "geometry", why) },
+    }
+}
+
+fn to_pose(p: &PkmPose) -> Pose {
+    let [a, b, c] = [p.a, p.b, p.c].map(radians);
+    Pose { x: p.x, y: p.y, z: p.z, a, b, c, u: p.u, v: p.v, w: p.w }
+}
+
+fn from_pose(p: &Pose) -> PkmPose {
+    let [a, b, c] = [p.a, p.b, p.c].map(degrees);
+    PkmPose { x: p.x, y: p.y, z: p.z, a, b, c, u: p.u, v: p.v, w: p.w }
+}
+
+/// Joints from C: as many as the machine has, degrees to radians.
+unsafe fn joints_from(m: &Mechanism, joints: *const f64) -> Joints {
+    let mut all = [0.0; MAX_JOINTS];
+    for (i, q) in (0..m.joint_count()).zip(all.iter_mut()) {
+        // SAFETY: the caller's array holds at least the machine's joints.
+        let value = unsafe { joints.add(i).read() };
+        *q = if m.joint_kind(i) == JointKind::Rotary { radians(value) } else { value };
+    }
+    all
+}
+
+unsafe fn joints_to(m: &Mechanism, all: &Joints, joints: *mut f64) {
+    for (i, q) in (0..m.joint_count()).zip(all) {
+        let value = if m.joint_kind(i) == JointKind::Rotary { degrees(*q) } else { *q };
+        // SAFETY: the caller's array holds at least the machine's joints.
+        unsafe { joints.add(i).write(value) };
+    }
+}
+
+/// What every constructor does; `None` from `new` is a usage error.
+unsafe fn construct<P>(
+    machine: *mut PkmMachine,
+    parameters: *const P,
+    error: *mut PkmError,
+    new: impl FnOnce(&P) -> Option<Result<Mechanism, GeometryError>>,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe {
+        match parameters.as_ref().and_then(new) {
+            Some(made) if !machine.is_null() => make(machine, error, made),
+            _ => usage(error),
+        }
+    }
+}
+
+/// Makes a general planar mechanism. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_planar(
+    machine: *mut PkmMachine,
+    parameters: *const PkmPlanar,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(Planar::new(&p.into()).map(Into::into))) }
+}
+
+/// Makes a MOMA. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_moma(
+    machine: *mut PkmMachine,
+    parameters: *const PkmMoma,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(Moma::new(&p.into()).map(Into::into))) }
+}
+
+/// Makes a MOMA 4S. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_moma_4s(
+    machine: *mut PkmMachine,
+    parameters: *const PkmMoma4s,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(Moma4s::new(&p.into()).map(Into::into))) }
+}
+
+/// Makes a MOMA-W. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_moma_w(
+    machine: *mut PkmMachine,
+    parameters: *const PkmMomaW,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(MomaW::new(&p.into()).map(Into::into))) }
+}
+
+/// Makes an HV-Mill with both mechanisms. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_hv_machine(
+    machine: *mut PkmMachine,
+    parameters: *const PkmHvMachine,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(HvMachine::new(&p.checked()?).map(Into::into))) }
+}
+
+/// Makes an O-X glide. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_ox_glide(
+    machine: *mut PkmMachine,
+    parameters: *const PkmOxGlide,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(OxGlide::new(&p.checked()?).map(Into::into))) }
+}
+
+/// Makes a Lambda. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_lambda6(
+    machine: *mut PkmMachine,
+    parameters: *const PkmLambda6,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(Lambda6::new(&p.into()).map(Into::into))) }
+}
+
+/// Makes a linear delta. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_linear_delta(
+    machine: *mut PkmMachine,
+    parameters: *const PkmLinearDelta,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(LinearDelta::new(&p.into()).map(Into::into))) }
+}
+
+/// Makes a hexapod. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_hexapod(
+    machine: *mut PkmMachine,
+    parameters: *const PkmHexapod,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(Hexapod::new(&p.into()).map(Into::into))) }
+}
+
+/// Makes a Cartesian machine with the axes of `letters` (a subset of "XYZABCUVW").
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_cartesian(
+    machine: *mut PkmMachine,
+    letters: *const core::ffi::c_char,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file; `letters` ends in 0.
+    unsafe {
+        if machine.is_null() || letters.is_null() {
+            return usage(error);
+        }
+        let mut set = AxisSet::default();
+        for letter in core::ffi::CStr::from_ptr(letters).to_bytes() {
+            match Axis::ALL.into_iter().find(|axis| axis.letter() == char::from(*letter)) {
+                Some(axis) => set = set.with(axis),
+                None => {
+                    return refuse(
+                        error,
+                        PkmStatus::Geometry,
+                        "geometry",
+                        "an axis letter is none of XYZABCUVW",
+                    );
+                }
+            }
+        }
+        make(machine, error, Cartesian::new(set).map(Mechanism::from))
+    }
+}
+
+/// Parameters of MOMA's configuration `'a'`, `'b'`, `'c'` or `'d'`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_moma_parameters(parameters: *mut PkmMoma, name: u8) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { give(parameters, PkmMoma::named(name)) }
+}
+
+/// Parameters of MOMA 4S: 0 is P, 5 and 10 are S5 and S10, −5 and −10 U5 and U10. Inferred dimensions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_moma_4s_parameters(parameters: *mut PkmMoma4s, outward_deg: i32) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { give(parameters, PkmMoma4s::named(outward_deg)) }
+}
+
+/// Default parameters of MOMA-W. Inferred dimensions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_moma_w_parameters(parameters: *mut PkmMomaW) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { give(parameters, Some(PkmMomaW::default())) }
+}
+
+/// Default parameters of the HV-Mill with head (fig 2b). Inferred dimensions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_hv_machine_parameters(parameters: *mut PkmHvMachine) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { give(parameters, Some(PkmHvMachine::seven())) }
+}
+
+/// Default parameters of Lambda (set yaw45). Inferred dimensions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_lambda6_parameters(parameters: *mut PkmLambda6) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { give(parameters, Some(PkmLambda6::yaw45())) }
+}
+
+unsafe fn give<T>(place: *mut T, value: Option<T>) -> PkmStatus {
+    match value {
+        // SAFETY: not NULL, and valid for writing by contract.
+        Some(value) if !place.is_null() => unsafe {
+            place.write(value);
+            PkmStatus::Ok
+        },
+        _ => PkmStatus::Usage,
+    }
+}
+
+/// Number of joints; 0 for a machine that was never made.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_joint_count(machine: *const PkmMachine) -> usize {
+    // SAFETY: the contract at the head of this file.
+    unsafe { mechanism(machine) }.map_or(0, Kinematics::joint_count)
+}
+
+/// Pose → joints (room for `pkm_joint_count`). `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_inverse(
+    machine: *const PkmMachine,
+    pose: *const PkmPose,
+    joints: *mut f64,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe {
+        let (Some(m), Some(pose), false) = (mechanism(machine), pose.as_ref(), joints.is_null()) else {
+            return usage(error);
+        };
+        match m.inverse(&to_pose(pose)) {
+            Ok(all) => {
+                joints_to(m, &all, joints);
+                PkmStatus::Ok
+            }
+            Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
+        }
+    }
+}
+
+/// Joints → pose. `pose` holds a pose nearby (the seed; all zeros: none) and receives the answer. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_forward(
+    machine: *const PkmMachine,
+    joints: *const f64,
+    pose: *mut PkmPose,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe {
+        let (Some(m), Some(pose), false) = (mechanism(machine), pose.as_mut(), joints.is_null()) else {
+            return usage(error);
+        };
+        match m.forward(&joints_from(m, joints), &to_pose(pose)) {
+            Ok(found) => {
+                *pose = from_pose(&found);
+                PkmStatus::Ok
+            }
+            Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
+        }
+    }
+}
+
+/// ∂joints/∂pose: 9 × 9 numbers, rows joints, columns X Y Z A B C U V W; angular columns per degree, rotary rows in degrees.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_jacobian(
+    machine: *const PkmMachine,
+    pose: *const PkmPose,
+    rows: *mut [f64; PKM_MAX_JOINTS],
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe {
+        let (Some(m), Some(pose), false) = (mechanism(machine), pose.as_ref(), rows.is_null()) else {
+            return usage(error);
+        };
+        let rows = core::slice::from_raw_parts_mut(rows, PKM_MAX_JOINTS);
+        match m.jacobian(&to_pose(pose)) {
+            Ok(jacobian) => {
+                for ((row, found), joint) in rows.iter_mut().zip(jacobian).zip(0..PKM_MAX_JOINTS) {
+                    let rotary = joint < m.joint_count() && m.joint_kind(joint) == JointKind::Rotary;
+                    for ((place, entry), axis) in row.iter_mut().zip(found).zip(Axis::ALL) {
+                        let per_degree = if axis.is_rotary() { radians(entry) } else { entry };
+                        *place = if rotary { degrees(per_degree) } else { per_degree };
+                    }
+                }
+                PkmStatus::Ok
+            }
+            Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
+        }
+    }
+}
+
+/// Joint rates and accelerations (degrees for rotary joints) of a pose moving with `velocity` and `acceleration`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_motion(
+    machine: *const PkmMachine,
+    pose: *const PkmPose,
+    velocity: *const PkmPose,
+    acceleration: *const PkmPose,
+    joint_velocity: *mut f64,
+    joint_acceleration: *mut f64,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe {
+        let (Some(m), Some(p), Some(v), Some(a)) =
+            (mechanism(machine), pose.as_ref(), velocity.as_ref(), acceleration.as_ref())
+        else {
+            return usage(error);
+        };
+        if joint_velocity.is_null() || joint_acceleration.is_null() {
+            return usage(error);
+        }
+        match m.motion(&to_pose(p), &to_pose(v), &to_pose(a)) {
+            Ok(motion) => {
+                joints_to(m, &motion.velocity, joint_velocity);
+                joints_to(m, &motion.acceleration, joint_acceleration);
+                PkmStatus::Ok
+            }
+            Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
+        }
+    }
+}
+
+/// Distance from singularities.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_singularity(
+    machine: *const PkmMachine,
+    pose: *const PkmPose,
+    measures: *mut PkmSingularity,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe {
+        let (Some(m), Some(pose), Some(measures)) = (mechanism(machine), pose.as_ref(), measures.as_mut())
+        else {
+            return usage(error);
+        };
+        match m.singularity(&to_pose(pose)) {
+            Ok(Singularity { inverse, inverse_joint, forward }) => {
+                *measures = PkmSingularity { inverse, inverse_joint, forward };
+                PkmStatus::Ok
+            }
+            Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
+        }
+    }
+}
+
+/// HV-Mill: makes `'H'` or `'V'` the active mechanism while the machine stands at `joints`; `pose` is updated. Nothing moves.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_switch(
+    machine: *mut PkmMachine,
+    to: u8,
+    joints: *const f64,
+    pose: *mut PkmPose,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe {
+        let (Some(Mechanism::HvMachine(mill)), Some(to)) = (mechanism(machine), spindle(to)) else {
+            return usage(error);
+        };
+        let (Some(pose), false) = (pose.as_mut(), joints.is_null()) else { return usage(error) };
+        let stands = joints_from(&Mechanism::HvMachine(*mill), joints);
+        match mill.switch(to, &stands, &to_pose(pose)) {
+            Ok((switched, found)) => {
+                *pose = from_pose(&found);
+                make(machine, error, Ok(Mechanism::HvMachine(switched)))
+            }
+            Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
+        }
+    }
+}
+
+/// The machine `kinematicsForward` and `kinematicsInverse` work on.
+static IN_USE: AtomicPtr<PkmMachine> = AtomicPtr::new(core::ptr::null_mut());
+
+/// Chooses the machine of `kinematicsForward` and `kinematicsInverse`; it must outlive their use. NULL chooses none.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_use(machine: *mut PkmMachine) {
+    IN_USE.store(machine, Ordering::Release);
+}
+
+/// As LinuxCNC's: joints → world, with the world's old value as seed. 0, or −1 if there is no answer. The flags are not used.
+#[unsafe(no_mangle)]
+#[allow(non_snake_case)]
+pub unsafe extern "C" fn kinematicsForward(
+    joint: *const f64,
+    world: *mut PkmPose,
+    _fflags: *const core::ffi::c_ulong,
+    _iflags: *mut core::ffi::c_ulong,
+) -> core::ffi::c_int {
+    // SAFETY: the contract at the head of this file.
+    let status = unsafe { pkm_forward(IN_USE.load(Ordering::Acquire), joint, world, core::ptr::null_mut()) };
+    if status == PkmStatus::Ok { 0 } else { -1 }
+}
+
+/// As LinuxCNC's: world → joints. 0, or −1 if there is no answer. The flags are not used.
+#[unsafe(no_mangle)]
+#[allow(non_snake_case)]
+pub unsafe extern "C" fn kinematicsInverse(
+    world: *const PkmPose,
+    joint: *mut f64,
+    _iflags: *const core::ffi::c_ulong,
+    _fflags: *mut core::ffi::c_ulong,
+) -> core::ffi::c_int {
+    // SAFETY: the contract at the head of this file.
+    let status = unsafe { pkm_inverse(IN_USE.load(Ordering::Acquire), world, joint, core::ptr::null_mut()) };
+    if status == PkmStatus::Ok { 0 } else { -1 }
+}
+
+/// As LinuxCNC's: 4, `KINEMATICS_BOTH`.
+#[unsafe(no_mangle)]
+#[allow(non_snake_case)]
+pub extern "C" fn kinematicsType() -> core::ffi::c_int {
+    4
+}
+
+#[cfg(not(feature = "std"))]
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    loop {}
+}
