@@ -1,4 +1,4 @@
-//! The whole MOMA HV-Mill: both mechanisms on one carriage and table, one of them active ([HV] figs 2a and 2b).
+//! The whole MOMA HV-Mill: both mechanisms on one carriage and table, one of them active (\[HV\] figs 2a and 2b).
 //!
 //! Source and symbols: [`crate::hv_mill`].
 //! Frame: H: X Y Z B (table) in {W} of H; V: U V W C (table) and B (head, fig 2b) in {W} of V, mm and rad.

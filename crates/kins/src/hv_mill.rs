@@ -1,13 +1,13 @@
 //! MOMA HV-Mill: a horizontal (H) and a vertical (V) MOMA 4S, one table carriage, one rotary table, optionally a tilting
 //! tool head on V; one mechanism is active at a time.
 //!
-//! Source: [HV] G. Vasilić, S. Živanović, M. Milutinović, Z. Dimić, "Kinematika kompleksne višeosne i viševretene mašine
+//! Source: \[HV\] G. Vasilić, S. Živanović, M. Milutinović, Z. Dimić, "Kinematika kompleksne višeosne i viševretene mašine
 //! alatke namenjene za proces obrade glodanjem".
 //! Frame: workpiece {W}, axes of {B_j} of the mechanism j (+z from workpiece to spindle, ISO 841), mm and rad.
 //! [`HvMill`] (one mechanism): X Y Z, table B (H) or C (V), head B (V). Joints p1 p2 p3 p4 (p5 on V).
-//! [`HvMachine`] (figs 2a, 2b): H: X Y Z B; V: U V W C and B for the head. Joints H1 H2 V1 V2 carriage table (head).
+//! [`HvMachine`](crate::HvMachine) (figs 2a, 2b): H: X Y Z B; V: U V W C and B for the head. Joints H1 H2 V1 V2 carriage table (head).
 //!
-//! | here          | [HV]        | meaning                                                        |
+//! | here          | \[HV\]        | meaning                                                        |
 //! |---------------|-------------|----------------------------------------------------------------|
 //! | `cr_mm`       | CR1         | centre of the rotary table at p3 = p4 = 0, in {B_j}            |
 //! | `w0_mm`       | ᶜᴿ¹p_W      | origin of {W} relative to CR1 at p4 = 0                        |
@@ -16,9 +16,9 @@
 //! | `head_sense`  | –           | s_b = ±1                                                       |
 //! | τ3            | –           | constant third coordinate of the tip                           |
 //!
-//! T_rot: [HV] (1), (2), correct as printed. V: (x, y, z) = (q1, −q3, q2); H: (x, y, z) = (−q1, q2, −q3).
+//! T_rot: \[HV\] (1), (2), correct as printed. V: (x, y, z) = (q1, −q3, q2); H: (x, y, z) = (−q1, q2, −q3).
 //! Inverse: ΔT = (R_θ − 1) A − (R_b − 1) r_t is added to the *translational* coordinates before the inverse of the
-//!   parallel mechanism. Corrected: [HV] (11) adds ΔT to joints; (10) describes two axes that both carry the workpiece,
+//!   parallel mechanism. Corrected: \[HV\] (11) adds ΔT to joints; (10) describes two axes that both carry the workpiece,
 //!   which is not the machine of fig 2b (see [`delta_t_workpiece`] for that chain).
 //! Singular: exactly where the active MOMA 4S is.
 //! Accuracy: as [`Planar`](crate::planar::Planar).
@@ -37,16 +37,16 @@ use crate::vector::{Vec3, add, is_finite, scale, sub};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, serde::Serialize))]
 pub enum Spindle {
-    /// Horizontal, `'` in [HV]: third axis z, table about y.
+    /// Horizontal, `'` in \[HV\]: third axis z, table about y.
     #[cfg_attr(feature = "serde", serde(alias = "h"))]
     H,
-    /// Vertical, `''` in [HV]: third axis y, table about z, head about y.
+    /// Vertical, `''` in \[HV\]: third axis y, table about z, head about y.
     #[cfg_attr(feature = "serde", serde(alias = "v"))]
     V,
 }
 
 impl Spindle {
-    /// {Q} → {B_j}: [HV] (1) for V, (2) for H.
+    /// {Q} → {B_j}: \[HV\] (1) for V, (2) for H.
     pub const fn from_q(self, [q1, q2, q3]: Vec3) -> Vec3 {
         match self {
             Self::V => [q1, -q3, q2],
@@ -120,7 +120,7 @@ impl Turn {
     }
 }
 
-/// ΔT for a chain in which **both** rotary axes carry the workpiece, axis 1 sitting on axis 2: [HV] (10) literally,
+/// ΔT for a chain in which **both** rotary axes carry the workpiece, axis 1 sitting on axis 2: \[HV\] (10) literally,
 /// (T₂T₁ − 1) A + (T₂ − 1) C with C = ᶜᴿ²p_CR1. Not the machine of fig 2b, whose second axis turns the tool.
 /// Lengths mm, angles rad; `a` = ᶜᴿ¹p_W + ᵂp_T.
 pub fn delta_t_workpiece(first: (Turn, f64), second: (Turn, f64), a: Vec3, c: Vec3) -> Vec3 {
@@ -336,7 +336,7 @@ impl HvMill {
         self.spindle.split(add(self.cr, sub(turned.workpiece, sub(turned.tool, self.r_t))))
     }
 
-    /// ΔT in {B_j}, mm: what the turned table and head add to the translational coordinates ([HV] (10), corrected).
+    /// ΔT in {B_j}, mm: what the turned table and head add to the translational coordinates (\[HV\] (10), corrected).
     ///
     /// # Errors
     /// `NotFinite`, `AxisLocked`.

@@ -1,29 +1,29 @@
 //! Lambda: a platform on three long chains, each braced by a short one; six sliders on three vertical shafts, six
 //! degrees of freedom.
 //!
-//! Source: [L6] Nešovanović and Živanović, "Workspace and kinematic structure analysis of a 6-DOF Lambda parallel kinematic
+//! Source: \[L6\] Nešovanović and Živanović, "Workspace and kinematic structure analysis of a 6-DOF Lambda parallel kinematic
 //! machine", IJEEC 6(1), 2022, doi 10.7251/IJEEC2206001N.
 //! Frame: base, origin in the middle of the shaft circle in the plane where all sliders are 0, Z up (z of the platform is
 //! negative), mm and rad. Machine axes X Y Z A B C = x y z ψ θ φ, R = Rz(φ) Ry(θ) Rx(ψ). Joints l1..l6, **downwards**;
 //! l1..l3 the upper sliders (long chains), l4..l6 the lower ones (short chains) of the same legs.
 //!
-//! | here              | [L6]   | meaning                                                        |
+//! | here              | \[L6\]   | meaning                                                        |
 //! |-------------------|--------|----------------------------------------------------------------|
 //! | `base_radius_mm`  | C      | radius of the shaft circle                                     |
 //! | `platform_radius_mm` | D   | radius (not a side) of the circle of the platform joints       |
 //! | `c_mm`, `r_mm`, `u_mm` | c, r, u | long chain, its part from J to N, short chain             |
 //! | e, k              | –      | c − r; e/c                                                     |
-//! | `yaw_offset_deg`  | –      | δ: turns the platform joints against the shafts; 0 in [L6]     |
+//! | `yaw_offset_deg`  | –      | δ: turns the platform joints against the shafts; 0 in \[L6\]     |
 //! | ρ, h, g           | –      | distance of N from its shaft; drops of long and short chain    |
 //! | σ                 | –      | measure of the direct singularity; its sign is the assembly    |
 //!
-//! Inverse: [L6] P(6)–P(11), closed form, evaluated with ρ² (the printed form subtracts numbers of order z²).
+//! Inverse: \[L6\] P(6)–P(11), closed form, evaluated with ρ² (the printed form subtracts numbers of order z²).
 //!   l_i = −N_z − h, l_{i+3} = l_i + k h + g. Working mode of the paper, the only one: slider above N, lower slider below J.
 //! Forward: each leg's triangle gives ρ and the height of N; z, ψ, θ follow in closed form; x, y, φ by Newton on the planar
 //!   three-circle problem: quadratic, at most 16 solves of 3×3 (2 with a warm start a servo period old). If it fails or ends
 //!   in the other assembly: all real solutions (at most six) from a trigonometric polynomial of degree 3, bounded.
 //! Singular: chain horizontal (h or g = 0, inverse); N on its shaft, or the three vertical planes through shaft and N
-//!   with a common line (σ = 0, forward). [L6] does not mention that with δ = 0 every pose with zero angles has σ = 0.
+//!   with a common line (σ = 0, forward). \[L6\] does not mention that with δ = 0 every pose with zero angles has σ = 0.
 //! Accuracy: forward(inverse(p)) within 1e-6 mm, 1e-9 rad where |σ| ≥ 0.1 (typically 1e-10 mm).
 //! Not modelled: collisions, joint cones at the sliders. All default dimensions are **inferred**, the paper prints none.
 
@@ -78,7 +78,7 @@ fn default_sigma_min() -> f64 {
     0.05
 }
 
-/// Sets of dimensions: all **inferred**, consistent with Table I of [L6], not published.
+/// Sets of dimensions: all **inferred**, consistent with Table I of \[L6\], not published.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lambda6Set {
     /// The paper's literal layout; singular at yaw 0.

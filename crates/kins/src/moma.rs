@@ -1,10 +1,10 @@
 //! MOMA: two sliders on fixed guides, two links of constant length; their common hinge is the platform P.
 //!
-//! Source: [MOMA] G. Vasilić, S. Živanović, "Modeliranje i analiza rekonfigurabilnog dvoosnog paralelnog mehanizma MOMA
+//! Source: \[MOMA\] G. Vasilić, S. Živanović, "Modeliranje i analiza rekonfigurabilnog dvoosnog paralelnog mehanizma MOMA
 //! sa osnaženim translatornim zglobovima", Tehnika 71(1), 2016, 57–63, doi 10.5937/tehnika1601057V.
 //! Frame: base {B}, right-handed, mm: machine axes X Y are P. Joints p1 p2.
 //!
-//! | here              | [MOMA] | meaning                             |
+//! | here              | \[MOMA\] | meaning                             |
 //! |-------------------|--------|-------------------------------------|
 //! | `reference_mm`    | Rᵢ     | pivot of drive i, slider at pᵢ = 0  |
 //! | `guide_angle_deg` | αᵢ     | direction of drive i (270° + γᵢ)    |
@@ -38,7 +38,7 @@ pub struct MomaParameters {
     pub one_sided: bool,
 }
 
-/// The configurations of [MOMA] fig 3.
+/// The configurations of \[MOMA\] fig 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum MomaConfiguration {

@@ -1,11 +1,11 @@
 //! MOMA 4S: a platform on four links in two parallel pairs; it translates without turning.
 //!
-//! Source: [HV] G. Vasilić, S. Živanović, M. Milutinović, Z. Dimić, "Kinematika kompleksne višeosne i viševretene mašine
-//! alatke namenjene za proces obrade glodanjem"; names of the configurations: [W], the same authors, "Mašina alatka sa
+//! Source: \[HV\] G. Vasilić, S. Živanović, M. Milutinović, Z. Dimić, "Kinematika kompleksne višeosne i viševretene mašine
+//! alatke namenjene za proces obrade glodanjem"; names of the configurations: \[W\], the same authors, "Mašina alatka sa
 //! paralelnim mehanizmima namenjena za sečenje penastih materijala usijanom žicom", section 2, fig 2.
 //! Frame: {Q}, q1 horizontal, q2 up, mm: machine axes X Y are the tool tip (q1, q2). Joints p1 p2.
 //!
-//! | here        | [HV]   | meaning                                                    |
+//! | here        | \[HV\]   | meaning                                                    |
 //! |-------------|--------|------------------------------------------------------------|
 //! | `pivot_mm`  | Oᵢ     | pivot about which drive i is turned when reconfiguring     |
 //! | `rho_mm`    | R_q,i  | reference point relative to Oᵢ at γᵢ = 0                   |
@@ -14,9 +14,9 @@
 //! | `l_t_mm`    | l_T    | length of the tool from P                                  |
 //! | `alpha_t_deg` | α_T  | 0: tool in the plane, down (V); 90°: normal to it (H)      |
 //!
-//! One link of each pair is enough: [`Planar`] with R = O + Rot(γ) ρ ([HV] (5)), o₁ = −l⃗_T − (l_1H, 0),
+//! One link of each pair is enough: [`Planar`] with R = O + Rot(γ) ρ (\[HV\] (5)), o₁ = −l⃗_T − (l_1H, 0),
 //!   o₂ = −l⃗_T + (l_2H, 0), l⃗_T = l_T (0, −cos α_T) in the plane, signed from P to the tip.
-//! Corrected in [HV] (4), (6)–(9): the linear term is +2p; chain 2 has −l_2H; l_T,q2 has one sign everywhere; no factor 2 in b.
+//! Corrected in \[HV\] (4), (6)–(9): the linear term is +2p; chain 2 has −l_2H; l_T,q2 has one sign everywhere; no factor 2 in b.
 //!   (8), (9) are not used: they divide by a difference that vanishes at regular poses.
 //! Not modelled: the pairs' own constraint singularity (a parallelogram that flattens); no paper gives their spacing.
 
@@ -65,7 +65,7 @@ fn minus() -> i8 {
     -1
 }
 
-/// The named configurations of [W] section 2.
+/// The named configurations of \[W\] section 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Moma4sConfiguration {
     /// Drives vertical.

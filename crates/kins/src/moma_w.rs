@@ -1,20 +1,20 @@
 //! MOMA-W: two MOMA 4S in parallel planes hold the ends of a hot wire; x y and u v are the contours it cuts.
 //!
-//! Source: [W] G. Vasilić, S. Živanović, M. Milutinović, Z. Dimić, "Mašina alatka sa paralelnim mehanizmima namenjena za
+//! Source: \[W\] G. Vasilić, S. Živanović, M. Milutinović, Z. Dimić, "Mašina alatka sa paralelnim mehanizmima namenjena za
 //! sečenje penastih materijala usijanom žicom". (1)–(4) are correct as printed; the contours are in fig 3, not fig 2, and
 //! the table axis, mentioned in the text, is absent from the equations.
 //! Frame: workpiece {W}, x = q1, y = q2, z the planes' normal, mm. Machine axes X Y (contour 1, plane z_W = 0),
 //! U V (contour 2, plane z_W = D; absolute, not relative to X Y), Z (table). Joints p1 p2 (mechanism 1), p3 p4
 //! (mechanism 2), p5 = Z.
 //!
-//! | here                   | [W]     | meaning                                             |
+//! | here                   | \[W\]     | meaning                                             |
 //! |------------------------|---------|-----------------------------------------------------|
 //! | `b_mm`                 | ᴮ¹p_B2  | origin of {B2} in {B1}                              |
 //! | `w_mm`                 | ᴮ¹p_W   | origin of {W} in {B1}, table at 0                   |
 //! | `contour_distance_mm`  | D       | distance of the contour planes                      |
 //!
 //! Inverse: with z₁ = w_z + z the height of contour plane 1, C₁ = (x, y) + w, C₂ = (u, v) + w:
-//!   P₁ = C₁ − (z₁/D)(C₂ − C₁) in {B1} ([W] (3)), P₂ = C₁ − b + ((b_z − z₁)/D)(C₂ − C₁) in {B2} ([W] (4)), D ≠ 0;
+//!   P₁ = C₁ − (z₁/D)(C₂ − C₁) in {B1} (\[W\] (3)), P₂ = C₁ − b + ((b_z − z₁)/D)(C₂ − C₁) in {B2} (\[W\] (4)), D ≠ 0;
 //!   then each mechanism's own inverse.
 //! Forward: both mechanisms, then the wire cut by the planes; divides by b_z ≠ 0.
 //! Singular: exactly where one mechanism is. det ∂(p1..p4)/∂(x,y,u,v) = det K₁ det K₂ (b_z/D)².
@@ -168,7 +168,7 @@ impl MomaW {
         }
     }
 
-    /// [W] (3), (4) and the checks of the wire.
+    /// \[W\] (3), (4) and the checks of the wire.
     #[inline]
     fn wire(&self, pose: &Pose) -> Result<Wire, InverseError> {
         let [bx, by, bz] = self.b;

@@ -1,11 +1,11 @@
 //! O-X glide: a platform on four links between two rigid pairs of sliders on parallel cross rails; O (extended) and X
 //! (crossed) form; the rails travel along the longitudinal guides.
 //!
-//! Source: [OX] C. Mladenović, S. Tabaković, M. Zeljković, "Radni prostor O-X glide hibridnog mehanizma".
+//! Source: \[OX\] C. Mladenović, S. Tabaković, M. Zeljković, "Radni prostor O-X glide hibridnog mehanizma".
 //! Frame: x along the cross rails from the rail end, y away from the rails, z longitudinal, mm. T = centre of the platform,
-//! which does not turn (assumed by [OX]). Joints AB CD Z.
+//! which does not turn (assumed by \[OX\]). Joints AB CD Z.
 //!
-//! | here   | [OX]       | meaning                                                         |
+//! | here   | \[OX\]       | meaning                                                         |
 //! |--------|------------|-----------------------------------------------------------------|
 //! | `l_mm` | l          | length of the links                                             |
 //! | `s_mm` | s          | width of the platform                                           |

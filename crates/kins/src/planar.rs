@@ -2,12 +2,12 @@
 //!
 //! MOMA and MOMA 4S are parameter sets of it; MOMA-W and the HV-Mill are built from those.
 //!
-//! Source: [MOMA] G. Vasilić, S. Živanović, Tehnika 71(1), 2016, 57–63, doi 10.5937/tehnika1601057V;
-//! [HV] G. Vasilić, S. Živanović, M. Milutinović, Z. Dimić, "Kinematika kompleksne višeosne i viševretene mašine
+//! Source: \[MOMA\] G. Vasilić, S. Živanović, Tehnika 71(1), 2016, 57–63, doi 10.5937/tehnika1601057V;
+//! \[HV\] G. Vasilić, S. Živanović, M. Milutinović, Z. Dimić, "Kinematika kompleksne višeosne i viševretene mašine
 //! alatke namenjene za proces obrade glodanjem". Several printed equations err; each correction is named where it stands.
 //! Frame: fixed, right-handed, mm. Joint i = travel of slider i along its guide from its reference point.
 //!
-//! | here               | [MOMA]    | meaning                                              |
+//! | here               | \[MOMA\]    | meaning                                              |
 //! |--------------------|-----------|------------------------------------------------------|
 //! | `direction`        | aᵢ        | unit vector of guide i                               |
 //! | `reference_mm`     | Rᵢ        | place of the slider joint at pᵢ = 0                  |
@@ -18,9 +18,9 @@
 //!
 //! With the *virtual centre* Cᵢ = Rᵢ − oᵢ + pᵢ aᵢ, T is an intersection of two circles about C₁ and C₂.
 //!
-//! Inverse: closed form, [MOMA] (4), (7)–(9) with the root's sign as a parameter (the printed minus is wrong for
+//! Inverse: closed form, \[MOMA\] (4), (7)–(9) with the root's sign as a parameter (the printed minus is wrong for
 //!   configurations c and d) and without the cancelling difference B² − C.
-//! Forward: intersection of two circles. [MOMA] (10)–(12) and [HV] (8), (9) divide by the difference of the centres' x,
+//! Forward: intersection of two circles. \[MOMA\] (10)–(12) and \[HV\] (8), (9) divide by the difference of the centres' x,
 //!   which vanishes at regular poses (sliders above each other); the circle form does not, so we depart from them.
 //! Singular: link i at a right angle to guide i (type 1, wᵢ = 0); links parallel (type 2, X = 0).
 //! Accuracy: forward(inverse(T)) within 1e-9 mm away from singularities; at wᵢ = 0 the square root leaves
@@ -60,7 +60,7 @@ pub struct PlanarParameters {
     pub working_mode: [i8; 2],
     /// s = ±1: the sign of cross(C₂ − C₁, T − C₁).
     pub assembly: i8,
-    /// Links may lie only on the inner side of their guides ([MOMA] figs 6b, 6d).
+    /// Links may lie only on the inner side of their guides (\[MOMA\] figs 6b, 6d).
     #[cfg_attr(feature = "serde", serde(default))]
     pub one_sided: bool,
 }
@@ -342,7 +342,7 @@ impl Planar {
         Ok([[l1[0] / w1, l1[1] / w1], [l2[0] / w2, l2[1] / w2]])
     }
 
-    /// G = ∂T/∂p at a solved state: rows x, y. [MOMA] (17)–(21) with the sign put right: ṗ = +K Ṫ, G = K⁻¹.
+    /// G = ∂T/∂p at a solved state: rows x, y. \[MOMA\] (17)–(21) with the sign put right: ṗ = +K Ṫ, G = K⁻¹.
     ///
     /// # Errors
     /// `Singular` where the links are parallel (ν below [`SINGULAR_GUARD`]).
