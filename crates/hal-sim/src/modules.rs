@@ -15,10 +15,11 @@ const MAX_COUNT: usize = 16;
 type Load = fn(&mut Hal, &[String]) -> Result<(), HalError>;
 
 /// The blocks by name.
-const BLOCKS: [(&str, Load); 19] = [
+const BLOCKS: [(&str, Load); 22] = [
     (and2::And2::NAME, block::load::<and2::And2>),
     (charge_pump::ChargePump::NAME, block::load::<charge_pump::ChargePump>),
     (comp::Comp::NAME, block::load::<comp::Comp>),
+    (dbounce::Dbounce::NAME, block::load::<dbounce::Dbounce>),
     (ddt::Ddt::NAME, block::load::<ddt::Ddt>),
     (estop_latch::EstopLatch::NAME, block::load::<estop_latch::EstopLatch>),
     (integ::Integ::NAME, block::load::<integ::Integ>),
@@ -32,19 +33,25 @@ const BLOCKS: [(&str, Load); 19] = [
     (or2::Or2::NAME, block::load::<or2::Or2>),
     (pid::Pid::NAME, block::load::<pid::Pid>),
     (scale::Scale::NAME, block::load::<scale::Scale>),
+    (shaft_encoder::ShaftEncoder::NAME, block::load::<shaft_encoder::ShaftEncoder>),
+    (shaft_switch::ShaftSwitch::NAME, block::load::<shaft_switch::ShaftSwitch>),
     (siggen::Siggen::NAME, block::load::<siggen::Siggen>),
     (sum2::Sum2::NAME, block::load::<sum2::Sum2>),
     (xor2::Xor2::NAME, block::load::<xor2::Xor2>),
 ];
 
 /// Modules and their options, for `help` and for messages.
-pub const MODULES: [(&str, &str); 5] = [
+pub const MODULES: [(&str, &str); 8] = [
     ("threads", "name1= period1= (ns) [fp1=] ... name3= period3="),
     ("motmod", "servo_period_nsec= [base_period_nsec=] [num_joints=]"),
     ("stepgen", "step_type=0[,0...] [ctrl_type=p[,p...]]"),
+    ("encoder", "[num_chan=]"),
+    ("driver", "model=NAME[,NAME...] (simulated: A4988 DRV8825 TMC2209 DM542 TB6600)"),
+    ("motor", "[num_chan=] (simulated)"),
     ("trivkins", "[coordinates=]"),
     (
-        "and2 charge_pump comp ddt estop_latch integ limit1 limit3 lut5 mult2 mux2 mux4 not or2 pid scale siggen sum2 xor2",
+        "and2 charge_pump comp dbounce ddt estop_latch integ limit1 limit3 lut5 mult2 mux2 mux4 not or2 pid scale \
+         shaft_encoder shaft_switch siggen sum2 xor2",
         "[count=N | num_chan=N | names=A,B,...]",
     ),
 ];
@@ -142,6 +149,12 @@ pub fn load(hal: &mut Hal, module: &str, options: &[&str]) -> Result<(), LoadErr
         "threads" => threads(hal, &choices),
         "motmod" => motmod(hal, &choices),
         "stepgen" => stepgen(hal, &choices),
+        "encoder" => Ok(encoder::Encoders::load(hal, channel_count(&choices)?)?),
+        "motor" => {
+            let channel = motor::MotorChannel { scale: 1.0, start: 0 };
+            Ok(motor::Motors::load(hal, &vec![channel; channel_count(&choices)?])?)
+        }
+        "driver" => driver(hal, &choices),
         "trivkins" => match choices.iter().find(|choice| choice.key != "coordinates") {
             Some(choice) => choice.unknown(),
             None => Ok(()), // joints are axes already
@@ -175,6 +188,35 @@ fn blocks(hal: &mut Hal, module: &str, choices: &[Choice<'_>]) -> Result<(), Loa
         }
     }
     Ok(load(hal, &names)?)
+}
+
+/// `num_chan`, 1 if it is not given.
+fn channel_count(choices: &[Choice<'_>]) -> Result<usize, LoadError> {
+    let mut count = 1;
+    for choice in choices {
+        match choice.key {
+            "num_chan" => count = choice.number(MAX_COUNT as u64, "a number from 1 to 16")? as usize,
+            _ => return choice.unknown(),
+        }
+    }
+    Ok(count)
+}
+
+fn driver(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {
+    let mut channels = None;
+    for choice in choices {
+        if choice.key != "model" {
+            return choice.unknown();
+        }
+        let entries: Vec<&str> = choice.value.split(',').collect();
+        let channel =
+            |entry: &&str| driver::minimum(entry).map(|minimum| driver::DriverChannel { minimum, start: 0 });
+        channels = entries.iter().map(channel).collect::<Option<Vec<_>>>();
+        if channels.as_ref().is_none_or(|channels| channels.len() > MAX_COUNT) {
+            return choice.bad("at most 16 of A4988, DRV8825, TMC2209, DM542, TB6600");
+        }
+    }
+    Ok(driver::Drivers::load(hal, &channels.ok_or(LoadError::Missing("model"))?)?)
 }
 
 fn threads(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {
