@@ -271,7 +271,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             here = sample.rows;
         }
         let (feed, rapid) = self.executor.overrides();
-        let running = self.executor.legs.last().map_or(0.0, |leg| leg.x);
+        // What is being driven, if it leads to the node (a braking leg may end before).
+        let running =
+            self.executor.legs.last().filter(|leg| sigma > 0.0 && leg.end >= node.length).map(|leg| leg.x);
         let mut legs = Legs::new();
         let mut add = |end: f64, x: f64| {
             // The end of the interval is the node itself, not a sum.
@@ -286,13 +288,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             add(end, x_end);
         } else {
             let (low, high) = exits(&here, &next.left, rows, length, x);
-            // From the middle of an interval the strips may miss each other by what changes within it; what is being
-            // driven stays admissible.
-            let x_end = match low <= high {
-                true => next.entry.clamp(low, high),
-                false if sigma > 0.0 => running,
-                false => 0.5 * (low + high),
-            };
+            // From the middle of an interval the strips, taken there anew, may exclude by a hair what is being driven;
+            // that stays admissible.
+            let (low, high) = running.map_or((low, high), |running| (low.min(running), high.max(running)));
+            let x_end = if low <= high { next.entry.clamp(low, high) } else { 0.5 * (low + high) };
             if x == 0.0 && self.nodes.len() == 2 && self.pieces.back().is_some_and(|last| last.open) {
                 // At rest with one interval known and more to come.
                 return false;
@@ -360,11 +359,12 @@ fn braking<const R: usize>(
     rows: usize,
     length: f64,
     x: f64,
-    running: f64,
+    running: Option<f64>,
 ) -> (f64, f64) {
     let (low, high) = exits(here, next, rows, length, x);
+    let low = running.map_or(low, |running| low.min(running));
     if low > high {
-        return (length, running);
+        return (length, 0.5 * (low + high));
     }
     if low > 0.0 {
         return (length, low);

@@ -13,6 +13,8 @@ use pkm_kins::{Kinematics, maths::sqrt};
 
 /// Change of the strips from node to node, in shares of the limits.
 const CHANGE: f64 = 0.01;
+/// However fast the strips change, nodes are no closer than this many to a servo period at full speed.
+const NODES_PER_PERIOD: f64 = 16.0;
 /// The speed is held so low that no more than about twice this many nodes are passed in a servo period.
 const NODES_PER_TICK: usize = 64;
 /// Nodes added in one go: bounds the work of a tick.
@@ -168,7 +170,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let mut sample = self.sample(piece, self.grid.s + step)?;
         for _ in 0..60 {
             let scales = last.variation(&sample);
-            let shortest = 0.25 * period * sqrt(scales.speed);
+            let shortest = period * sqrt(scales.speed) / NODES_PER_PERIOD;
             if step <= shortest || scales.change <= CHANGE {
                 break;
             }

@@ -105,7 +105,9 @@ pub(crate) struct Piece {
     pub(crate) span: Span,
 }
 
-impl<K, const R: usize, const PIECES: usize, const NODES: usize> core::fmt::Debug for Planner<K, R, PIECES, NODES> {
+impl<K, const R: usize, const PIECES: usize, const NODES: usize> core::fmt::Debug
+    for Planner<K, R, PIECES, NODES>
+{
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("Planner")
             .field("pieces", &self.pieces.len())

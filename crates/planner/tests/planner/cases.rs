@@ -7,8 +7,8 @@ use crate::harness::{Case, Disturbance, drive, with_stack};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::moma::{Moma, MomaConfiguration};
 use pkm_kins::{Axis, AxisSet};
-use pkm_planner::path::{Geometry, Line, Tolerance, Vector};
 use pkm_planner::PathMode;
+use pkm_planner::path::{Geometry, Line, Tolerance, Vector};
 
 const PERIOD_S: f64 = 1e-3;
 const PI: f64 = core::f64::consts::PI;

@@ -121,4 +121,3 @@ pub(crate) fn drive(case: &Case, period_s: f64, disturbance: Disturbance, one_pe
         end: planner.setpoint().pose.to_array(),
     }
 }
-

@@ -36,7 +36,8 @@ fn path(seed: &mut u64, centre: [f64; 2], r: f64) -> Vec<(Geometry, PathMode)> {
             mode_now = mode(seed);
         }
         let length = [1e-7, 1e-3, 0.02, 0.3, 3.0, 20.0][(random(seed) % 6) as usize] * (0.5 + unit(seed));
-        let turn = [0.0, 1e-9, 1e-5, 0.01, 0.3, 1.5707963267948966, 3.141592653589793, 3.0][(random(seed) % 8) as usize];
+        let turn = [0.0, 1e-9, 1e-5, 0.01, 0.3, 1.5707963267948966, 3.141592653589793, 3.0]
+            [(random(seed) % 8) as usize];
         let (c, s) = (libm::cos(turn), libm::sin(turn) * if random(seed) % 2 == 0 { 1.0 } else { -1.0 });
         let direction = [last[0] * c - last[1] * s, last[0] * s + last[1] * c];
         let next = xyz(at[0] + length * direction[0], at[1] + length * direction[1], 0.0);
