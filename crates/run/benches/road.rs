@@ -47,8 +47,8 @@ fn timed<O: Observer + Send>(
     outputs: impl Fn(&Simulation) -> O + Send + Sync,
 ) -> (f64, Summary) {
     let begin = Instant::now();
-    let (summary, _) =
-        run(program, machine, &Options::default(), &outputs, |_| ControlFlow::Continue(())).expect("readable");
+    let (summary, _) = run(program, machine, &Options::default(), &outputs, |_| ControlFlow::Continue(()))
+        .expect("readable");
     assert!(summary.completed, "{:?}", summary.diagnostics);
     (begin.elapsed().as_secs_f64(), summary)
 }
@@ -95,7 +95,10 @@ fn peak_mib() -> Option<f64> {
 }
 
 fn main() {
-    println!("{:24} {:>10}  {:>11}  {:>18}  {:>11}", "program", "simulated", "run", "run with files", "check");
+    println!(
+        "{:24} {:>10}  {:>11}  {:>18}  {:>11}",
+        "program", "simulated", "run", "run with files", "check"
+    );
     row("moma-w-aerofoil.ngc", "moma-w");
     row("moma-w-moulding.ngc", "moma-w");
     row("moma-arcs.ngc", "moma-a");
@@ -117,7 +120,8 @@ fn main() {
     drop(text);
     let program = Program::File(path.clone());
     let begin = Instant::now();
-    let summary = run(&program, &machine, &Options::default(), |_: &Simulation| Nothing, |_| ControlFlow::Continue(()));
+    let summary =
+        run(&program, &machine, &Options::default(), |_: &Simulation| Nothing, |_| ControlFlow::Continue(()));
     let seconds = begin.elapsed().as_secs_f64();
     let _ = std::fs::remove_file(&path);
     let (summary, _) = summary.expect("readable");

@@ -70,12 +70,12 @@ fn main() {
     };
 
     let mut svg = String::from(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 860 660\" font-family=\"sans-serif\" font-size=\"15\">\n\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"170 40 640 500\" font-family=\"sans-serif\" font-size=\"15\">\n\
          <style>polyline{fill:none;stroke-linejoin:round;stroke-linecap:round}.rail{stroke:#999;stroke-width:7}\
          .link{stroke:#0072b2;stroke-width:5}.bar{stroke:#0072b2;stroke-width:8}.wire{stroke:#d55e00;stroke-width:2.5}\
          .sheet{stroke:#d55e00;stroke-width:.5;opacity:.35}.path{stroke:#d55e00;stroke-width:1.5}\
          .block{stroke:#777;stroke-width:1;stroke-dasharray:4 4}.joint{fill:#fff;stroke:#0072b2;stroke-width:2.5}\
-         .slider{fill:#333}text{fill:#333}</style>\n<rect width=\"860\" height=\"660\" fill=\"#fff\"/>\n",
+         .slider{fill:#333}text{fill:#333}</style>\n<rect x=\"170\" y=\"40\" width=\"640\" height=\"500\" fill=\"#fff\"/>\n",
     );
     let here = poses[poses.len() * 3 / 10];
     let joints = machine.mechanism.inverse(&here).expect("the pose was driven");
@@ -89,10 +89,11 @@ fn main() {
             polyline(&mut svg, "link", [slider, joint]);
             dot(&mut svg, "slider", slider, 9.0);
         }
-        polyline(&mut svg, "bar", [
-            [platform[0] - 30.0, platform[1], z],
-            [platform[0] + 30.0, platform[1], z],
-        ]);
+        polyline(
+            &mut svg,
+            "bar",
+            [[platform[0] - 30.0, platform[1], z], [platform[0] + 30.0, platform[1], z]],
+        );
         for side in [-30.0, 30.0] {
             dot(&mut svg, "joint", [platform[0] + side, platform[1], z], 5.0);
         }
@@ -113,8 +114,7 @@ fn main() {
     }
     polyline(&mut svg, "wire", wire(&here));
     svg.push_str(
-        "<text x=\"20\" y=\"640\">MOMA-W cutting a tapered wing panel: 338 blocks, both wire ends on their own contour. \
-         Drawn from the trace of pkm run.</text>\n</svg>\n",
+        "<text x=\"190\" y=\"526\">MOMA-W cutting a tapered wing panel, each wire end on its own contour (from pkm run)</text>\n</svg>\n",
     );
     print!("{svg}");
 }
