@@ -114,7 +114,7 @@ fn main() {
     }
     polyline(&mut svg, "wire", wire(&here));
     svg.push_str(
-        "<text x=\"190\" y=\"526\">MOMA-W cutting a tapered wing panel, each wire end on its own contour (from pkm run)</text>\n</svg>\n",
+        "<text x=\"190\" y=\"526\">MOMA-W cutting a tapered wing panel, drawn from a run of pkm</text>\n</svg>\n",
     );
     print!("{svg}");
 }

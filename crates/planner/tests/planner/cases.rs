@@ -1,9 +1,11 @@
 //! The planning cases whose shortest possible durations are known (toppra 0.6.10 on the finest grid), judged on
 //! the trace alone: first and second differences of the joint positions at the servo period and at a tenth of it.
 //!
-//! `val_…`: T_ref is from an outside source. P10 to P12 need the delta and the hexapod.
+//! `val_…`: T_ref is from an outside source.
 
 use crate::harness::{Case, Disturbance, drive, with_stack};
+use pkm_kins::hexapod::{Hexapod, HexapodParameters};
+use pkm_kins::linear_delta::{LinearDelta, LinearDeltaParameters};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::moma::{Moma, MomaConfiguration};
 use pkm_kins::{Axis, AxisSet};
@@ -157,4 +159,58 @@ fn val_trapezoid_on_identity() {
         feed_mm_s: f64::INFINITY,
     };
     judge("P17", &p17, 3.1333);
+}
+
+fn delta(moves: Vec<(Geometry, PathMode)>) -> Case {
+    let parameters = LinearDeltaParameters { joint_radius_mm: 105.0, joint_length_mm: 217.0 };
+    Case {
+        mechanism: Mechanism::LinearDelta(LinearDelta::new(&parameters).unwrap()),
+        velocity: vec![200.0; 3],
+        acceleration: vec![3000.0; 3],
+        moves,
+        feed_mm_s: f64::INFINITY,
+    }
+}
+
+#[test]
+fn val_linear_delta() {
+    let start = xyz(80.0, 0.0, 20.0);
+    let circle = pkm_planner::path::Arc::new(start, start, [0.0, 0.0, 20.0], [0.0, 0.0, 1.0], 1).unwrap();
+    judge("P10", &delta(vec![(Geometry::Arc(circle), PathMode::ExactPath)]), 1.545056);
+    let helix: Vec<Vector> = (0..=1000)
+        .map(|k| {
+            let f = f64::from(k) / 1000.0;
+            let r = 60.0 * (0.4 + 0.6 * f);
+            xyz(r * libm::cos(6.0 * PI * f), r * libm::sin(6.0 * PI * f), 5.0 + 40.0 * f)
+        })
+        .collect();
+    judge("P11", &delta(polyline(&helix, blend(0.02))), 2.265327);
+}
+
+#[test]
+fn val_hexapod() {
+    let ring = |radius: f64, half_gap_deg: f64| {
+        core::array::from_fn(|i| {
+            let side = if i % 2 == 0 { -1.0 } else { 1.0 };
+            let angle = (120.0 * (i / 2) as f64 + side * half_gap_deg) * PI / 180.0;
+            [radius * libm::cos(angle), radius * libm::sin(angle), 0.0]
+        })
+    };
+    let parameters =
+        HexapodParameters { base_mm: ring(120.0, 10.0), platform_mm: ring(60.0, 50.0), start_z_mm: 150.0 };
+    let pose = |p: [f64; 3], deg: [f64; 3]| {
+        let [a, b, c] = deg.map(|d| d * PI / 180.0);
+        [p[0], p[1], p[2], a, b, c, 0.0, 0.0, 0.0]
+    };
+    let case = Case {
+        mechanism: Mechanism::Hexapod(Hexapod::new(&parameters).unwrap()),
+        velocity: vec![100.0; 6],
+        acceleration: vec![1000.0; 6],
+        moves: line(
+            pose([-30.0, -20.0, 150.0], [-5.0, 3.0, 0.0]),
+            pose([30.0, 20.0, 170.0], [5.0, -3.0, 10.0]),
+        ),
+        feed_mm_s: f64::INFINITY,
+    };
+    judge("P12", &case, 0.595388);
 }
