@@ -8,6 +8,7 @@
 //! Units at the pins: mm and **degrees**, as in LinuxCNC.
 
 use crate::component::{Component, Fault, Setpoint, Tick};
+use crate::faults::{Injected, PinFault};
 use crate::values::{BitPin, FloatPin, PinType, S32Pin, U32Pin, Value, Values};
 use pkm_stepgen::{Period, TimingError};
 use std::collections::BTreeMap;
@@ -151,6 +152,7 @@ pub struct Hal {
     components: Vec<Box<dyn Component>>,
     threads: Vec<Thread>,
     base_ticks: u64,
+    faults: Vec<Injected>,
 }
 
 fn check_name(name: &str, signal: bool) -> Result<(), HalError> {
@@ -184,6 +186,7 @@ impl Hal {
             components: Vec::new(),
             threads: Vec::new(),
             base_ticks: 0,
+            faults: Vec::new(),
         })
     }
 
@@ -226,39 +229,10 @@ impl Hal {
             Value::S32(value) => values.s32s.pin(value),
             Value::U32(value) => values.u32s.pin(value),
         };
-        let own_cell = self.pin_cells(value.pin_type())[index as usize];
+        let own_cell = values.pin_cells(value.pin_type())[index as usize];
         let record = PinRecord { pin_type: value.pin_type(), role, index, own_cell, signal: None, owner };
         self.pins.insert(name.to_owned(), record);
         Ok(index)
-    }
-
-    fn pin_cells(&mut self, pin_type: PinType) -> &mut Vec<u32> {
-        match pin_type {
-            PinType::Bit => &mut self.values.bits.pins,
-            PinType::Float => &mut self.values.floats.pins,
-            PinType::S32 => &mut self.values.s32s.pins,
-            PinType::U32 => &mut self.values.u32s.pins,
-        }
-    }
-
-    fn cell(&self, pin_type: PinType, cell: u32) -> Value {
-        let cell = cell as usize;
-        match pin_type {
-            PinType::Bit => Value::Bit(self.values.bits.cells[cell]),
-            PinType::Float => Value::Float(self.values.floats.cells[cell]),
-            PinType::S32 => Value::S32(self.values.s32s.cells[cell]),
-            PinType::U32 => Value::U32(self.values.u32s.cells[cell]),
-        }
-    }
-
-    fn set_cell(&mut self, cell: u32, value: Value) {
-        let cell = cell as usize;
-        match value {
-            Value::Bit(value) => self.values.bits.cells[cell] = value,
-            Value::Float(value) => self.values.floats.cells[cell] = value,
-            Value::S32(value) => self.values.s32s.cells[cell] = value,
-            Value::U32(value) => self.values.u32s.cells[cell] = value,
-        }
     }
 
     /// A new bit pin or parameter.
@@ -327,7 +301,7 @@ impl Hal {
             Some(signal) => self.signals[signal].cell,
             None => pin.own_cell,
         };
-        Ok(self.cell(pin.pin_type, cell))
+        Ok(self.values.cell(pin.pin_type, cell))
     }
 
     /// Sets a parameter, or an input pin that is not linked (`setp`).
@@ -340,7 +314,7 @@ impl Hal {
             return Err(HalError::NotSettable { name: name.to_owned() });
         }
         check_value(name, pin.pin_type, value)?;
-        self.set_cell(pin.own_cell, value);
+        self.values.set_cell(pin.own_cell, value);
         Ok(())
     }
 
@@ -384,7 +358,7 @@ impl Hal {
     pub fn pins(&self) -> impl Iterator<Item = (&str, PinType, Role, Value, Option<&str>, &'static str)> {
         self.pins.iter().map(|(name, pin)| {
             let cell = pin.signal.as_ref().map_or(pin.own_cell, |signal| self.signals[signal].cell);
-            let value = self.cell(pin.pin_type, cell);
+            let value = self.values.cell(pin.pin_type, cell);
             (name.as_str(), pin.pin_type, pin.role, value, pin.signal.as_deref(), pin.owner)
         })
     }
@@ -400,17 +374,12 @@ impl Hal {
         if self.signals.contains_key(name) {
             return Err(HalError::Taken { name: name.to_owned() });
         }
-        let values = &mut self.values;
-        let cell = match pin_type {
-            PinType::Bit => {
-                let cell = values.bits.cell(false);
-                values.edges.resize_with(values.bits.cells.len(), Default::default);
-                cell
-            }
-            PinType::Float => values.floats.cell(0.0),
-            PinType::S32 => values.s32s.cell(0),
-            PinType::U32 => values.u32s.cell(0),
-        };
+        let cell = self.values.new_cell(match pin_type {
+            PinType::Bit => Value::Bit(false),
+            PinType::Float => Value::Float(0.0),
+            PinType::S32 => Value::S32(0),
+            PinType::U32 => Value::U32(0),
+        });
         self.signals.insert(name.to_owned(), SignalRecord { pin_type, cell, pins: Vec::new() });
         Ok(())
     }
@@ -454,9 +423,9 @@ impl Hal {
         }
         let (cell, first) = (signal.cell, signal.pins.is_empty());
         if first || pin.role == Role::Out {
-            self.set_cell(cell, self.cell(pin.pin_type, pin.own_cell));
+            self.values.set_cell(cell, self.values.cell(pin.pin_type, pin.own_cell));
         }
-        self.pin_cells(pin.pin_type)[pin.index as usize] = cell;
+        self.values.pin_cells(pin.pin_type)[pin.index as usize] = cell;
         if let Some(record) = self.pins.get_mut(pin_name) {
             record.signal = Some(signal_name.to_owned());
         }
@@ -476,8 +445,8 @@ impl Hal {
         let (pin_type, index, own_cell) = (pin.pin_type, pin.index, pin.own_cell);
         if let Some(signal) = pin.signal.take().and_then(|name| self.signals.get_mut(&name)) {
             signal.pins.retain(|name| name != pin_name);
-            self.set_cell(own_cell, value);
-            self.pin_cells(pin_type)[index as usize] = own_cell;
+            self.values.set_cell(own_cell, value);
+            self.values.pin_cells(pin_type)[index as usize] = own_cell;
         }
         Ok(())
     }
@@ -518,7 +487,7 @@ impl Hal {
     /// `Unknown`.
     pub fn gets(&self, name: &str) -> Result<Value, HalError> {
         let signal = self.signals.get(name).ok_or_else(|| unknown("signal", name))?;
-        Ok(self.cell(signal.pin_type, signal.cell))
+        Ok(self.values.cell(signal.pin_type, signal.cell))
     }
 
     /// Sets a signal that has no writer (`sets`).
@@ -531,7 +500,7 @@ impl Hal {
             return Err(HalError::NotSettable { name: name.to_owned() });
         }
         check_value(name, signal.pin_type, value)?;
-        self.set_cell(signal.cell, value);
+        self.values.set_cell(signal.cell, value);
         Ok(())
     }
 
@@ -539,7 +508,7 @@ impl Hal {
     pub fn signals(&self) -> impl Iterator<Item = (&str, PinType, Value, Vec<(&str, Role)>)> {
         self.signals.iter().map(|(name, signal)| {
             let pins = signal.pins.iter().map(|pin| (pin.as_str(), self.pins[pin].role)).collect();
-            (name.as_str(), signal.pin_type, self.cell(signal.pin_type, signal.cell), pins)
+            (name.as_str(), signal.pin_type, self.values.cell(signal.pin_type, signal.cell), pins)
         })
     }
 
@@ -645,7 +614,8 @@ impl Hal {
     /// The first [`Fault`] of a component. All functions have run nevertheless, and time has gone on: a component that
     /// refuses leaves its outputs as they were, and the emergency stop works as ever.
     pub fn run(&mut self, setpoint: Option<&Setpoint>) -> Result<(), Fault> {
-        let Self { threads, components, values, base_ticks, .. } = self;
+        let faulty = !self.faults.is_empty() && self.faults_begin_and_end();
+        let Self { threads, components, values, base_ticks, faults, .. } = self;
         let mut result = Ok(());
         for thread in threads {
             if *base_ticks % thread.every != 0 {
@@ -654,12 +624,83 @@ impl Hal {
             thread.ticks += 1;
             let tick = Tick { number: thread.ticks, period: thread.period, setpoint };
             for &(component, function) in &thread.run {
+                if faulty {
+                    show_faults(faults, values);
+                }
                 result = result.and(components[component].run(function, values, &tick));
             }
             thread.period = thread.period.next();
         }
         *base_ticks += 1;
         result
+    }
+
+    // ---- faults
+
+    /// Puts a fault on an input pin. Ticks are periods of the first thread, counted from 1; a fault whose time has come
+    /// already begins with the next period.
+    ///
+    /// # Errors
+    /// `Unknown`: there is no such input pin.
+    pub fn inject(&mut self, fault: &PinFault) -> Result<(), HalError> {
+        let pin = self.pins.get(&fault.pin).filter(|pin| matches!(pin.role, Role::In | Role::InOut));
+        let pin = pin.ok_or_else(|| unknown("input pin", &fault.pin))?;
+        let (pin_type, index) = (pin.pin_type, pin.index);
+        let frozen = self.values.cell(pin_type, pin.own_cell);
+        let cell = self.values.new_cell(frozen);
+        let tick = fault.tick.max(self.base_ticks + 1);
+        let end = fault.ticks.map_or(u64::MAX, |ticks| tick.saturating_add(ticks));
+        self.faults.push(Injected {
+            tick,
+            end,
+            kind: fault.kind,
+            pin_type,
+            index,
+            cell,
+            original: None,
+            frozen,
+        });
+        Ok(())
+    }
+
+    /// Redirects pins whose faults begin with this period, and back those whose faults end. True if one is there.
+    fn faults_begin_and_end(&mut self) -> bool {
+        let now = self.base_ticks + 1;
+        for n in 0..self.faults.len() {
+            let fault = &mut self.faults[n];
+            let (pin_type, index) = (fault.pin_type, fault.index as usize);
+            let pin = &mut self.values.pin_cells(pin_type)[index];
+            if now == fault.tick {
+                fault.original = Some(*pin);
+                *pin = fault.cell;
+                fault.frozen = self.values.cell(pin_type, fault.original.unwrap_or(fault.cell));
+            } else if now == fault.end
+                && let Some(original) = fault.original.take()
+            {
+                let cell = fault.cell;
+                if *pin == cell {
+                    *pin = original;
+                } else if let Some(later) = self
+                    .faults
+                    .iter_mut()
+                    .find(|later| later.original == Some(cell) && later.pin_type == pin_type)
+                {
+                    // another fault began on the same pin meanwhile: it reads the signal itself from now on
+                    later.original = Some(original);
+                }
+            }
+        }
+        self.faults.iter().any(|fault| fault.original.is_some())
+    }
+}
+
+/// Lets the faulty pins show what they make of their signals.
+fn show_faults(faults: &[Injected], values: &mut Values) {
+    for fault in faults {
+        if let Some(original) = fault.original {
+            let value = values.cell(fault.pin_type, original);
+            values.set_cell(fault.cell, fault.apply(value));
+        }
     }
 }
 

@@ -20,6 +20,7 @@
 pub mod block;
 pub mod component;
 pub mod components;
+pub mod faults;
 pub mod hal;
 pub mod hal_file;
 pub mod modules;
@@ -31,6 +32,7 @@ pub mod vcd;
 
 pub use component::{Component, Fault, PinIndex, PinName, Setpoint, SetpointSource, Tick};
 pub use components::driver::Violations;
+pub use faults::{FaultKind, FaultTextError, PinFault};
 pub use hal::{Hal, HalError, MAX_NAME, Role};
 pub use pkm_stepgen::{Edge, Line, PulseTimingNs};
 pub use simulation::{

@@ -183,6 +183,50 @@ pub struct Values {
 }
 
 impl Values {
+    /// Where the pins of a type point.
+    pub(crate) fn pin_cells(&mut self, pin_type: PinType) -> &mut Vec<u32> {
+        match pin_type {
+            PinType::Bit => &mut self.bits.pins,
+            PinType::Float => &mut self.floats.pins,
+            PinType::S32 => &mut self.s32s.pins,
+            PinType::U32 => &mut self.u32s.pins,
+        }
+    }
+
+    pub(crate) fn cell(&self, pin_type: PinType, cell: u32) -> Value {
+        let cell = cell as usize;
+        match pin_type {
+            PinType::Bit => Value::Bit(self.bits.cells[cell]),
+            PinType::Float => Value::Float(self.floats.cells[cell]),
+            PinType::S32 => Value::S32(self.s32s.cells[cell]),
+            PinType::U32 => Value::U32(self.u32s.cells[cell]),
+        }
+    }
+
+    pub(crate) fn set_cell(&mut self, cell: u32, value: Value) {
+        let cell = cell as usize;
+        match value {
+            Value::Bit(value) => self.bits.cells[cell] = value,
+            Value::Float(value) => self.floats.cells[cell] = value,
+            Value::S32(value) => self.s32s.cells[cell] = value,
+            Value::U32(value) => self.u32s.cells[cell] = value,
+        }
+    }
+
+    /// A new cell of a signal.
+    pub(crate) fn new_cell(&mut self, value: Value) -> u32 {
+        match value {
+            Value::Bit(value) => {
+                let cell = self.bits.cell(value);
+                self.edges.resize_with(self.bits.cells.len(), Default::default);
+                cell
+            }
+            Value::Float(value) => self.floats.cell(value),
+            Value::S32(value) => self.s32s.cell(value),
+            Value::U32(value) => self.u32s.cell(value),
+        }
+    }
+
     /// Level of a bit pin.
     #[inline]
     pub fn bit(&self, pin: BitPin) -> bool {

@@ -14,7 +14,7 @@
 
 use crate::component::{Component, Fault, Tick};
 use crate::hal::{Hal, HalError, Role};
-use crate::values::{BitPin, FloatPin, LineEdge, S32Pin, Values};
+use crate::values::{BitPin, FloatPin, S32Pin, Values};
 
 #[derive(Debug, Clone)]
 struct Channel {
@@ -35,8 +35,8 @@ struct Channel {
     /// Lines, in counter mode.
     rises: i64,
     last_position: f64,
-    /// Edges of a period, with their lines; kept for its memory.
-    edges: Vec<(LineEdge, usize)>,
+    /// Edges of a period: time, line, place among the line's, level; kept for its memory.
+    edges: Vec<(u64, usize, usize, bool)>,
 }
 
 /// See the module.
@@ -111,12 +111,12 @@ impl Channel {
         edges.clear();
         for (line, pin) in self.lines.into_iter().enumerate() {
             let fresh = values.edges(pin).read(&mut self.cursors[line], end);
-            edges.extend(fresh.iter().map(|edge| (*edge, line)));
+            edges.extend(fresh.iter().enumerate().map(|(place, edge)| (edge.time, line, place, edge.level)));
         }
         // in order of time; A before B before Z at the same time
-        edges.sort_unstable_by_key(|(edge, line)| (edge.time, *line));
-        for &(edge, line) in &edges {
-            self.edge(line, edge.level, values);
+        edges.sort_unstable();
+        for &(_, line, _, level) in &edges {
+            self.edge(line, level, values);
         }
         self.edges = edges;
         // lines that are set without edges, by other components

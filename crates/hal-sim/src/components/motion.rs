@@ -178,11 +178,16 @@ impl Motion {
         let mut result = Ok(());
         for (n, (_, pins)) in self.joints.iter().enumerate() {
             let position = values.float(pins.motor_pos_fb);
+            if !position.is_finite() {
+                let pin = joint_pin(n, "motor-pos-fb");
+                result = result.and(Err(Fault::NotFinite { tick, pin, value: position }));
+                continue;
+            }
             let error = values.float(pins.pos_cmd) - position;
             values.set_float(pins.pos_fb, position);
             values.set_float(pins.f_error, error);
             let limit = values.float(pins.f_error_lim);
-            if limit > 0.0 && !(error.abs() <= limit) {
+            if limit > 0.0 && error.abs() > limit {
                 let pin = joint_pin(n, "f-error");
                 result = result.and(Err(Fault::FollowingError { tick, pin, value: error, limit }));
             }
@@ -196,10 +201,11 @@ impl Motion {
         result
     }
 
-    /// Drives off; the commands are where the motors are.
+    /// Drives off; the commands are where the motors are, as far as that can be told.
     fn stand(&mut self, values: &mut Values) {
         for ((joint, pins), last) in self.joints.iter().zip(&mut self.last) {
-            let position = values.float(pins.motor_pos_fb);
+            let feedback = values.float(pins.motor_pos_fb);
+            let position = if feedback.is_finite() { feedback } else { shown(joint.kind, *last) };
             values.set_float(pins.pos_cmd, position);
             values.set_float(pins.motor_pos_cmd, position);
             values.set_float(pins.vel_cmd, 0.0);
