@@ -8,7 +8,8 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// Joints of the largest machine: the length of every joint array.
+// Joints of the largest machine. Every joint array given to a function has this many places; of those a function fills it
+// touches only the machine's joints.
 #define PKM_MAX_JOINTS 9
 
 // Words in a machine's storage.
@@ -29,6 +30,9 @@ typedef enum {
 // A machine, ready to run. Opaque: made by a constructor such as `pkm_moma`.
 typedef struct {
   uint64_t made;
+  // Bit i: joint i is rotary. 0: nothing of the machine needs degrees.
+  uint32_t rotary;
+  uint32_t joint_count;
   uint64_t words[PKM_MACHINE_WORDS];
 } PkmMachine;
 
@@ -209,7 +213,7 @@ PkmStatus pkm_lambda6_parameters(PkmLambda6 *parameters);
 // Number of joints; 0 for a machine that was never made.
 uintptr_t pkm_joint_count(const PkmMachine *machine);
 
-// Pose → joints (room for `pkm_joint_count`). `error` may be NULL.
+// Pose → joints. `error` may be NULL.
 PkmStatus pkm_inverse(const PkmMachine *machine,
                       const PkmPose *pose,
                       double *joints,

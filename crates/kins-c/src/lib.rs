@@ -22,7 +22,8 @@ pub use parameters::*;
 use pkm_kins::maths::{degrees, radians};
 use pkm_kins::*;
 
-/// Joints of the largest machine: the length of every joint array.
+/// Joints of the largest machine. Every joint array given to a function has this many places; of those a function fills it
+/// touches only the machine's joints.
 pub const PKM_MAX_JOINTS: usize = 9;
 
 /// Words in a machine's storage.
@@ -55,6 +56,9 @@ pub struct PkmPose {
 #[derive(Clone, Copy)]
 pub struct PkmMachine {
     made: u64,
+    /// Bit i: joint i is rotary. 0: nothing of the machine needs degrees.
+    rotary: u32,
+    joint_count: u32,
     words: [u64; PKM_MACHINE_WORDS],
 }
 
@@ -138,13 +142,18 @@ unsafe fn usage(error: *mut PkmError) -> PkmStatus {
     unsafe { refuse(error, PkmStatus::Usage, "usage", "a pointer is NULL or the machine was never made") }
 }
 
+/// A machine that a constructor made.
+#[inline]
+unsafe fn made<'a>(machine: *const PkmMachine) -> Option<&'a PkmMachine> {
+    // SAFETY: NULL or valid.
+    unsafe { machine.as_ref() }.filter(|machine| machine.made == MADE)
+}
+
 /// The mechanism in a machine's storage.
+#[inline]
 unsafe fn mechanism<'a>(machine: *const PkmMachine) -> Option<&'a Mechanism> {
-    // SAFETY: NULL or valid; `made` says that a constructor wrote a `Mechanism` into the words (size and alignment are asserted).
-    unsafe {
-        let machine = machine.as_ref()?;
-        (machine.made == MADE).then(|| &*machine.words.as_ptr().cast::<Mechanism>())
-    }
+    // SAFETY: `made` says that a constructor wrote a `Mechanism` into the words (size and alignment are asserted).
+    unsafe { made(machine).map(|machine| &*machine.words.as_ptr().cast::<Mechanism>()) }
 }
 
 unsafe fn make(
@@ -155,7 +164,13 @@ unsafe fn make(
     match made {
         // SAFETY: `machine` is not NULL (checked by the callers) and has room for a `Mechanism`.
         Ok(mechanism) => unsafe {
-            machine.write(PkmMachine { made: MADE, words: [0; PKM_MACHINE_WORDS] });
+            let joint_count = mechanism.joint_count();
+            let mut rotary = 0;
+            for joint in 0..joint_count {
+                rotary |= u32::from(mechanism.joint_kind(joint) == JointKind::Rotary) << joint;
+            }
+            let joint_count = joint_count as u32;
+            machine.write(PkmMachine { made: MADE, rotary, joint_count, words: [0; PKM_MACHINE_WORDS] });
             (&raw mut (*machine).words).cast::<Mechanism>().write(mechanism);
             PkmStatus::Ok
         },
@@ -164,30 +179,49 @@ unsafe fn make(
     }
 }
 
+#[inline]
 fn to_pose(p: &PkmPose) -> Pose {
     let [a, b, c] = [p.a, p.b, p.c].map(radians);
     Pose { x: p.x, y: p.y, z: p.z, a, b, c, u: p.u, v: p.v, w: p.w }
 }
 
+#[inline]
 fn from_pose(p: &Pose) -> PkmPose {
     let [a, b, c] = [p.a, p.b, p.c].map(degrees);
     PkmPose { x: p.x, y: p.y, z: p.z, a, b, c, u: p.u, v: p.v, w: p.w }
 }
 
-/// Joints from C: as many as the machine has, degrees to radians.
-unsafe fn joints_from(m: &Mechanism, joints: *const f64) -> Joints {
-    let mut all = [0.0; MAX_JOINTS];
-    for (i, q) in (0..m.joint_count()).zip(all.iter_mut()) {
-        // SAFETY: the caller's array holds at least the machine's joints.
-        let value = unsafe { joints.add(i).read() };
-        *q = if m.joint_kind(i) == JointKind::Rotary { radians(value) } else { value };
+/// Hands joints in radians to `f`: the caller's own array where nothing is rotary (a copy would cost more than a planar inverse).
+#[inline]
+unsafe fn with_joints<T>(machine: &PkmMachine, joints: *const f64, f: impl FnOnce(&Joints) -> T) -> T {
+    // SAFETY: not NULL (checked by the callers), and PKM_MAX_JOINTS long.
+    let given = unsafe { &*joints.cast::<Joints>() };
+    if machine.rotary == 0 {
+        return f(given);
     }
-    all
+    let mut all = *given;
+    for (i, q) in all.iter_mut().enumerate() {
+        if machine.rotary >> i & 1 == 1 {
+            *q = radians(*q);
+        }
+    }
+    f(&all)
 }
 
-unsafe fn joints_to(m: &Mechanism, all: &Joints, joints: *mut f64) {
-    for (i, q) in (0..m.joint_count()).zip(all) {
-        let value = if m.joint_kind(i) == JointKind::Rotary { degrees(*q) } else { *q };
+/// Hands a pose in radians to `f`: the caller's own where A B C are all 0.
+#[inline]
+fn with_pose<T>(pose: &PkmPose, f: impl FnOnce(&Pose) -> T) -> T {
+    if pose.a == 0.0 && pose.b == 0.0 && pose.c == 0.0 {
+        // SAFETY: both are nine f64 in the same order (`repr(C)`), and 0° is 0 rad.
+        return f(unsafe { &*core::ptr::from_ref(pose).cast::<Pose>() });
+    }
+    f(&to_pose(pose))
+}
+
+#[inline]
+unsafe fn joints_to(machine: &PkmMachine, all: &Joints, joints: *mut f64) {
+    for (i, q) in (0..machine.joint_count as usize).zip(all) {
+        let value = if machine.rotary >> i & 1 == 1 { degrees(*q) } else { *q };
         // SAFETY: the caller's array holds at least the machine's joints.
         unsafe { joints.add(i).write(value) };
     }
@@ -391,7 +425,7 @@ pub unsafe extern "C" fn pkm_joint_count(machine: *const PkmMachine) -> usize {
     unsafe { mechanism(machine) }.map_or(0, Kinematics::joint_count)
 }
 
-/// Pose → joints (room for `pkm_joint_count`). `error` may be NULL.
+/// Pose → joints. `error` may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pkm_inverse(
     machine: *const PkmMachine,
@@ -404,9 +438,9 @@ pub unsafe extern "C" fn pkm_inverse(
         let (Some(m), Some(pose), false) = (mechanism(machine), pose.as_ref(), joints.is_null()) else {
             return usage(error);
         };
-        match m.inverse(&to_pose(pose)) {
+        match with_pose(pose, |pose| m.inverse(pose)) {
             Ok(all) => {
-                joints_to(m, &all, joints);
+                joints_to(&*machine, &all, joints);
                 PkmStatus::Ok
             }
             Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
@@ -427,7 +461,7 @@ pub unsafe extern "C" fn pkm_forward(
         let (Some(m), Some(pose), false) = (mechanism(machine), pose.as_mut(), joints.is_null()) else {
             return usage(error);
         };
-        match m.forward(&joints_from(m, joints), &to_pose(pose)) {
+        match with_pose(pose, |seed| with_joints(&*machine, joints, |q| m.forward(q, seed))) {
             Ok(found) => {
                 *pose = from_pose(&found);
                 PkmStatus::Ok
@@ -490,8 +524,8 @@ pub unsafe extern "C" fn pkm_motion(
         }
         match m.motion(&to_pose(p), &to_pose(v), &to_pose(a)) {
             Ok(motion) => {
-                joints_to(m, &motion.velocity, joint_velocity);
-                joints_to(m, &motion.acceleration, joint_acceleration);
+                joints_to(&*machine, &motion.velocity, joint_velocity);
+                joints_to(&*machine, &motion.acceleration, joint_acceleration);
                 PkmStatus::Ok
             }
             Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
@@ -538,8 +572,7 @@ pub unsafe extern "C" fn pkm_switch(
             return usage(error);
         };
         let (Some(pose), false) = (pose.as_mut(), joints.is_null()) else { return usage(error) };
-        let stands = joints_from(&Mechanism::HvMachine(*mill), joints);
-        match mill.switch(to, &stands, &to_pose(pose)) {
+        match with_joints(&*machine, joints, |q| mill.switch(to, q, &to_pose(pose))) {
             Ok((switched, found)) => {
                 *pose = from_pose(&found);
                 make(machine, error, Ok(Mechanism::HvMachine(switched)))

@@ -62,7 +62,7 @@ impl LinearDelta {
         Ok(Self { columns: [[0.0, radius], [-side, -0.5 * radius], [side, -0.5 * radius]], rod })
     }
 
-    #[inline]
+    #[inline(always)]
     fn rods(&self, pose: &Pose) -> Result<[Rod; 3], InverseError> {
         let mut rods = [([0.0; 2], 0.0); 3];
         for ((rod, column), chain) in rods.iter_mut().zip(&self.columns).zip(0u8..) {
@@ -77,6 +77,7 @@ impl LinearDelta {
             }
             *rod = (w, sqrt(if square > 0.0 { square } else { 0.0 }));
         }
+        // x and y are finite here: a NaN fails the comparison above.
         if !pose.z.is_finite() {
             return Err(InverseError::NotFinite);
         }
@@ -126,6 +127,7 @@ impl LinearDelta {
         Ok(add([a[0], a[1], q1], add(centre, scale(drop, n))))
     }
 
+    #[inline]
     fn joints(pose: &Pose, [(_, a), (_, b), (_, c)]: &[Rod; 3]) -> Joints {
         let mut joints = [0.0; MAX_JOINTS];
         [joints[0], joints[1], joints[2]] = [pose.z + a, pose.z + b, pose.z + c];
@@ -157,6 +159,7 @@ impl Kinematics for LinearDelta {
         ("", crate::machine::number(joint))
     }
 
+    #[inline]
     fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
         Ok(Self::joints(pose, &self.rods(pose)?))
     }

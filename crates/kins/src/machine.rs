@@ -64,15 +64,18 @@ macro_rules! mechanisms {
             fn limit_code(&self, limit: &JointLimit) -> LimitCode {
                 match self { $(Self::$name(m) => m.limit_code(limit)),+ }
             }
+            #[inline]
             fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
                 match self { $(Self::$name(m) => Kinematics::inverse(m, pose)),+ }
             }
+            #[inline]
             fn forward(&self, joints: &Joints, seed: &Pose) -> Result<Pose, ForwardError> {
                 match self { $(Self::$name(m) => Kinematics::forward(m, joints, seed)),+ }
             }
             fn jacobian(&self, pose: &Pose) -> Result<Jacobian, InverseError> {
                 match self { $(Self::$name(m) => Kinematics::jacobian(m, pose)),+ }
             }
+            #[inline]
             fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
                 match self { $(Self::$name(m) => Kinematics::motion(m, pose, velocity, acceleration)),+ }
             }

@@ -231,7 +231,7 @@ impl Planar {
     ///
     /// # Errors
     /// As [`Self::inverse`].
-    #[inline]
+    #[inline(always)]
     pub fn solve(&self, t: Vec2) -> Result<PlanarState, InverseError> {
         let [c1, c2] = &self.chains;
         let (Some((p1, l1, w1)), Some((p2, l2, w2))) = (c1.solve(t, c1.mode), c2.solve(t, c2.mode)) else {
