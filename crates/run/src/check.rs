@@ -110,7 +110,23 @@ fn pose_ok(machine: &Machine, pose: &Pose) -> Result<(), PlanErrorKind> {
     Ok(())
 }
 
-/// Samples one move from end to end; the first place that cannot be is the block's finding.
+/// By how much more than `known` an error of the same kind misses; negative for another kind.
+fn excess(kind: &PlanErrorKind, known: &PlanErrorKind) -> f64 {
+    let beyond = |value: f64, range: JointRange| (range.min - value).max(value - range.max);
+    match (kind, known) {
+        (
+            PlanErrorKind::JointTravel { joint, value, range },
+            PlanErrorKind::JointTravel { joint: known_joint, value: known, .. },
+        ) if joint == known_joint => beyond(*value, *range) - beyond(*known, *range),
+        (
+            PlanErrorKind::AxisTravel { axis, value, range },
+            PlanErrorKind::AxisTravel { axis: known_axis, value: known, .. },
+        ) if axis == known_axis => beyond(*value, *range) - beyond(*known, *range),
+        _ => -1.0,
+    }
+}
+
+/// Samples one move from end to end; the worst place of the first kind of trouble is the block's finding.
 fn check_move(program: &Program, machine: &Machine, step: &Move, span: Span, checked: &mut Checked) {
     if !step.rapid && !(step.feed.speed > 0.0) {
         checked.add(program, messages::feed_unset(program, span));
@@ -119,23 +135,30 @@ fn check_move(program: &Program, machine: &Machine, step: &Move, span: Span, che
     let bend = if matches!(step.geometry, Geometry::Line(_)) { 1.0 } else { 4.0 };
     let count = (length * bend / SPACING).clamp(2.0, f64::from(MOST_SAMPLES)) as u32;
     let mut nearest: Option<(f64, usize, Pose)> = None;
+    let mut worst: Option<(PlanErrorKind, Pose)> = None;
     for k in 0..=count {
         let s = if k == count { length } else { length * f64::from(k) / f64::from(count) };
         let pose = Pose::from_array(step.geometry.at(s).position);
         if let Err(kind) = pose_ok(machine, &pose) {
-            checked.add(program, messages::plan(program, machine, &PlanError { kind, span, pose }));
-            return;
+            if worst.as_ref().is_none_or(|(known, _)| excess(&kind, known) > 0.0) {
+                worst = Some((kind, pose));
+            }
+            continue;
         }
         let Ok(measure) = machine.mechanism.singularity(&pose) else { continue };
         let value = measure.inverse.min(measure.forward);
         if !(value >= machine.singularity.guard) {
-            let kind = PlanErrorKind::Unreachable(pkm_kins::InverseError::Singular { measure: value });
-            checked.add(program, messages::plan(program, machine, &PlanError { kind, span, pose }));
-            return;
-        }
-        if value < machine.singularity.warn && nearest.is_none_or(|(best, ..)| value < best) {
+            worst.get_or_insert((
+                PlanErrorKind::Unreachable(pkm_kins::InverseError::Singular { measure: value }),
+                pose,
+            ));
+        } else if value < machine.singularity.warn && nearest.is_none_or(|(best, ..)| value < best) {
             nearest = Some((value, measure.inverse_joint, pose));
         }
+    }
+    if let Some((kind, pose)) = worst {
+        checked.add(program, messages::plan(program, machine, &PlanError { kind, span, pose }));
+        return;
     }
     if let Some((value, joint, pose)) = nearest {
         checked.add(program, messages::too_near_singularity(program, machine, span, &pose, joint, value));

@@ -1,5 +1,7 @@
 //! The whole road on the shipped programs: run, then let the independent judge read the trace, and count the VCD back.
 
+#![allow(clippy::print_stdout)]
+
 use pkm_analysis::checker;
 use pkm_hal_sim::{Observer, Simulation, TickReport, TraceWriter, VcdSteps, VcdWriter};
 use pkm_machine::Machine;
@@ -26,11 +28,15 @@ impl Observer for Outputs {
     }
 }
 
-fn drive(
-    program: &str,
-    machine: &Machine,
-    options: &Options,
-) -> (Summary, Vec<u8>, Vec<u8>, Vec<(u64, Vec<i64>)>) {
+/// What a run leaves behind.
+struct Left {
+    summary: Summary,
+    trace: Vec<u8>,
+    vcd: Vec<u8>,
+    counts: Vec<(u64, Vec<i64>)>,
+}
+
+fn drive(program: &str, machine: &Machine, options: &Options) -> Left {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../programs").join(program);
     let outputs = |simulation: &Simulation| Outputs {
         trace: TraceWriter::new(Vec::new(), simulation),
@@ -41,14 +47,18 @@ fn drive(
         run(&Program::File(path), machine, options, outputs, |_| ControlFlow::Continue(()))
             .expect("readable");
     let outputs = outputs.unwrap_or_else(|| panic!("refused: {:?}", summary.diagnostics));
-    let trace = outputs.trace.finish().unwrap();
-    (summary, trace, outputs.vcd.finish().unwrap(), outputs.counts)
+    Left {
+        summary,
+        trace: outputs.trace.finish().unwrap(),
+        vcd: outputs.vcd.finish().unwrap(),
+        counts: outputs.counts,
+    }
 }
 
 /// `blend_mm`: what the program's G64 P allows beyond half a step of every joint.
 fn holds(program: &str, machine: &str, blend_mm: f64) {
     let machine = Machine::load(machine, &[]).expect("a shipped machine");
-    let (summary, trace, vcd, counts) = drive(program, &machine, &Options::default());
+    let Left { summary, trace, vcd, counts } = drive(program, &machine, &Options::default());
     println!("{summary:#?}");
     assert!(summary.completed, "{program}: {:?}", summary.diagnostics);
     assert!(summary.max_step_error_steps <= 0.5, "{program}: {}", summary.max_step_error_steps);

@@ -92,7 +92,7 @@ pub(crate) fn drive(case: &Case, period_s: f64, disturbance: Disturbance, one_pe
         match disturbance {
             Disturbance::None => {}
             Disturbance::RandomOverride => {
-                if random(&mut seed) % (3 * per_ms) == 0 {
+                if random(&mut seed).is_multiple_of(3 * per_ms) {
                     let factor = (random(&mut seed) % 121) as f64 / 100.0;
                     assert!(planner.set_feed_override(factor) && planner.set_rapid_override(factor));
                 }
@@ -103,8 +103,8 @@ pub(crate) fn drive(case: &Case, period_s: f64, disturbance: Disturbance, one_pe
         ticks += 1;
         rows.push(setpoint.joints);
         let k = rows.len();
-        for j in 0..n {
-            let (a, b, c) = (rows[k - 3][j], rows[k - 2][j], rows[k - 1][j]);
+        let (before, last, now) = (rows[k - 3], rows[k - 2], rows[k - 1]);
+        for (j, ((a, b), c)) in before.iter().zip(last).zip(now).enumerate().take(n) {
             velocity = velocity.max(((c - b) / period_s).abs() / case.velocity[j]);
             acceleration =
                 acceleration.max(((c - 2.0 * b + a) / (period_s * period_s)).abs() / case.acceleration[j]);

@@ -1,4 +1,5 @@
 //! Tests of the planner from outside: known cases, and random paths.
+#![allow(clippy::print_stdout)]
 
 mod cases;
 mod harness;

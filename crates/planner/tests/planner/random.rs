@@ -32,13 +32,14 @@ fn path(seed: &mut u64, centre: [f64; 2], r: f64) -> Vec<(Geometry, PathMode)> {
     let blocks = 1 + random(seed) % 40;
     let mut last = [1.0, 0.0];
     for _ in 0..blocks {
-        if random(seed) % 8 == 0 {
+        if random(seed).is_multiple_of(8) {
             mode_now = mode(seed);
         }
         let length = [1e-7, 1e-3, 0.02, 0.3, 3.0, 20.0][(random(seed) % 6) as usize] * (0.5 + unit(seed));
-        let turn = [0.0, 1e-9, 1e-5, 0.01, 0.3, 1.5707963267948966, 3.141592653589793, 3.0]
+        let turn = [0.0, 1e-9, 1e-5, 0.01, 0.3, core::f64::consts::FRAC_PI_2, core::f64::consts::PI, 3.0]
             [(random(seed) % 8) as usize];
-        let (c, s) = (libm::cos(turn), libm::sin(turn) * if random(seed) % 2 == 0 { 1.0 } else { -1.0 });
+        let (c, s) =
+            (libm::cos(turn), libm::sin(turn) * if random(seed).is_multiple_of(2) { 1.0 } else { -1.0 });
         let direction = [last[0] * c - last[1] * s, last[0] * s + last[1] * c];
         let next = xyz(at[0] + length * direction[0], at[1] + length * direction[1], 0.0);
         if !inside(&next) {
@@ -46,10 +47,10 @@ fn path(seed: &mut u64, centre: [f64; 2], r: f64) -> Vec<(Geometry, PathMode)> {
             continue;
         }
         last = direction;
-        let arc = (random(seed) % 4 == 0 && length > 1e-3).then(|| {
+        let arc = (random(seed).is_multiple_of(4) && length > 1e-3).then(|| {
             // A half circle over the chord.
             let middle = [0.5 * (at[0] + next[0]), 0.5 * (at[1] + next[1]), 0.0];
-            Arc::new(at, next, middle, [0.0, 0.0, 1.0], if random(seed) % 2 == 0 { 1 } else { -1 })
+            Arc::new(at, next, middle, [0.0, 0.0, 1.0], if random(seed).is_multiple_of(2) { 1 } else { -1 })
         });
         let geometry = match (arc.flatten(), Line::new(at, next)) {
             (Some(arc), _) if length <= 0.5 * r => Geometry::Arc(arc),
@@ -77,7 +78,7 @@ fn hold(mut make: impl FnMut(&mut u64) -> Case + Send) {
                 1 => Disturbance::HoldThirds,
                 _ => Disturbance::None,
             };
-            let trace = drive(&case, 1e-3, disturbance, number % 5 == 0);
+            let trace = drive(&case, 1e-3, disturbance, number.is_multiple_of(5));
             let goal = case.moves.last().expect("not empty").0;
             let goal = goal.at(goal.length()).position;
             let ends_there = trace.end.iter().zip(goal).all(|(got, want)| (got - want).abs() < 1e-9);
