@@ -9,6 +9,7 @@
 mod attitude;
 pub mod cartesian;
 pub mod errors;
+pub mod geometry;
 pub mod hexapod;
 pub mod hv_machine;
 pub mod hv_mill;
