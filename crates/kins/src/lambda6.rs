@@ -343,22 +343,34 @@ impl Lambda6 {
         }
     }
 
+    /// The distances of the sliders on each shaft, which single travels do not bound. Forward does not apply them: homing and
+    /// jogging outside limits must still show a position.
+    ///
+    /// # Errors
+    /// `Spacing`.
+    pub fn check_spacing(&self, l: &Joints) -> Result<(), InverseError> {
+        let [l1, l2, l3, l4, l5, l6, ..] = *l;
+        self.within(0, l4 - l1)?;
+        self.within(1, l5 - l2)?;
+        self.within(2, l6 - l3)
+    }
+
+    #[inline]
+    fn within(&self, leg: u8, value_mm: f64) -> Result<(), InverseError> {
+        let [low, high] = self.spacing;
+        if !(value_mm >= low - 1e-9) {
+            return Err(InverseError::Spacing { leg, side: Side::Low, value_mm, limit_mm: low });
+        }
+        if !(value_mm <= high + 1e-9) {
+            return Err(InverseError::Spacing { leg, side: Side::High, value_mm, limit_mm: high });
+        }
+        Ok(())
+    }
+
     #[inline]
     fn check(&self, legs: &[LegState; 3], at: &Attitude) -> Result<(), InverseError> {
         for (leg, number) in legs.iter().zip(0u8..) {
-            let value_mm = leg.lower - leg.upper;
-            let [low, high] = self.spacing;
-            if !(value_mm >= low - 1e-9) {
-                return Err(InverseError::Spacing { leg: number, side: Side::Low, value_mm, limit_mm: low });
-            }
-            if !(value_mm <= high + 1e-9) {
-                return Err(InverseError::Spacing {
-                    leg: number,
-                    side: Side::High,
-                    value_mm,
-                    limit_mm: high,
-                });
-            }
+            self.within(number, leg.lower - leg.upper)?;
         }
         if self.cone_cos > -1.5 {
             return self.check_cone(legs, at);

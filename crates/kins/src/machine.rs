@@ -118,6 +118,18 @@ mechanisms! {
 }
 
 impl Mechanism {
+    /// Limits that couple joints and therefore are no joint's travel: Lambda's slider spacing. The inverse applies them by
+    /// itself; after a forward query they are asked for here.
+    ///
+    /// # Errors
+    /// `Spacing`.
+    pub fn coupled_limits(&self, joints: &Joints) -> Result<(), InverseError> {
+        match self {
+            Self::Lambda6(m) => m.check_spacing(joints),
+            _ => Ok(()),
+        }
+    }
+
     /// The same mechanism without limits of its own that are not geometry (wire length and tilt, ...):
     /// what `--no-limits` asks.
     pub fn without_limits(self) -> Self {

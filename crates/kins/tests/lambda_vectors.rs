@@ -61,6 +61,9 @@ fn val_poses() {
             close(*a, e, 1e-9, what);
         }
         let violations = codes(&row["violations"]);
+        let spacing = Mechanism::from(limited).coupled_limits(&joints(&expected)).err();
+        let listed = violations.iter().find(|code| code.starts_with("spacing")).cloned();
+        assert_eq!(spacing.map(|error| error.code().to_string()), listed, "{what}");
         let code = inverse_code(&limited, &ranges(&row["set"]), &p);
         match violations.is_empty() {
             true => assert_eq!(code, None, "{what}"),
