@@ -2,7 +2,9 @@
 
 use crate::support::{pkm_with_input, write};
 use serde_json::{Value, json};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 const VECTORS: &str = include_str!("../crates/kins/tests/data/planar-examples.json");
 /// mm, and relative for Jacobian entries.
@@ -394,4 +396,24 @@ fn refused_lines_keep_their_place() {
     );
     assert_eq!((answers[0]["error"]["code"].as_str(), status), (Some("bad_input"), 1));
     assert!(answers[1]["pose"]["y"].is_number() && answers[1]["pose"]["z"].is_null());
+}
+
+#[test]
+fn each_answer_comes_before_the_next_question() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_pkm"))
+        .args(["kins", "inverse", "--machine", "moma-a"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut questions = child.stdin.take().unwrap();
+    let mut answers = BufReader::new(child.stdout.take().unwrap()).lines();
+    for x in 0..3 {
+        writeln!(questions, "{{\"x\":{x},\"y\":-265}}").unwrap();
+        let answer: Value = serde_json::from_str(&answers.next().unwrap().unwrap()).unwrap();
+        assert!(answer["joints"][0].is_number(), "{answer}");
+    }
+    drop(questions);
+    assert!(answers.next().is_none());
+    assert!(child.wait().unwrap().success());
 }

@@ -5,7 +5,7 @@ use crate::outcome::{Failure, Outcome};
 use pkm_kins::{Axis, Joints, Kinematics, MAX_JOINTS, Pose, maths};
 use pkm_machine::{Machine, Refusal};
 use serde::{Deserialize, Serialize};
-use std::io::{BufRead, BufWriter, Write, stdin, stdout};
+use std::io::{BufRead, BufReader, BufWriter, Write, stdin, stdout};
 
 /// A pose as written: mm and degrees.
 #[derive(Debug, Clone, Copy, Default, Deserialize, Serialize)]
@@ -112,7 +112,7 @@ pub(crate) fn run(command: &Kins) -> Result<Outcome, Failure> {
         Kins::Forward(_) => query.forward(line),
         Kins::Jacobian(_) => query.jacobian(line),
     };
-    let mut input = stdin().lock();
+    let mut input = BufReader::new(stdin().lock());
     let mut output = BufWriter::new(stdout().lock());
     let mut outcome = Outcome::Clean;
     let mut line = Vec::new();
@@ -135,7 +135,7 @@ pub(crate) fn run(command: &Kins) -> Result<Outcome, Failure> {
         serde_json::to_writer(&mut output, &answer).map_err(std::io::Error::from)?;
         output.write_all(b"\n")?;
         // Whoever waits for an answer gets it before the next question.
-        if !input.fill_buf().is_ok_and(|rest| !rest.is_empty()) {
+        if input.buffer().is_empty() {
             output.flush()?;
         }
     }
