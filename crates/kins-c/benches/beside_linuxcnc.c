@@ -99,17 +99,21 @@ static double time_inverse(Inverse inverse) {
 static double time_forward(Forward forward) {
   static double runs[RUNS];
   double worst = 0;
+  int failed = 0;
   unsigned long flags = 0;
   for (int r = 0; r < RUNS; r++) {
     double start = now();
+    failed = 0;
     for (int i = 0; i < POSES; i++) {
       PkmPose p = seeds[i];
       if (forward(joints[i], &p, &flags, &flags) != 0)
-        worst = INFINITY;
-      worst = fmax(worst, fabs(p.x - poses[i].x));
+        failed++;
+      else
+        worst = fmax(worst, fabs(p.x - poses[i].x));
     }
     runs[r] = (now() - start) / POSES;
   }
+  if (failed) printf("  (forward failed for %d of %d poses)\n", failed, POSES);
   if (worst > 1e-3) printf("  (forward is off by %g)\n", worst);
   qsort(runs, RUNS, sizeof runs[0], by_size);
   return runs[RUNS / 2];
