@@ -627,7 +627,11 @@ impl Hal {
                 if faulty {
                     show_faults(faults, values);
                 }
-                result = result.and(components[component].run(function, values, &tick));
+                if let Err(fault) = components[component].run(function, values, &tick)
+                    && result.is_ok()
+                {
+                    result = Err(fault);
+                }
             }
             thread.period = thread.period.next();
         }

@@ -24,48 +24,54 @@ pub struct VcdWriter<W: Write> {
     end: u64,
 }
 
-/// The text of a time, `#123456789\n`. Times come in order, so all but the last four digits are mostly those of before.
+/// The text of times, `#123456789\n`. Times come in order, so all but the last four digits are mostly those of before.
 #[derive(Debug)]
 struct Stamp {
-    text: [u8; 32],
-    /// Time / 10⁴ that is in the text, and its end there; 0: none.
+    /// `#` and the digits of `high`.
+    head: [u8; 24],
+    length: usize,
+    /// Time / 10⁴ that is in the head; 0: none.
     high: u64,
-    high_end: usize,
-    end: usize,
 }
 
 impl Stamp {
     const fn new() -> Self {
-        Self { text: [b'#'; 32], high: 0, high_end: 1, end: 1 }
+        Self { head: [b'#'; 24], length: 1, high: 0 }
     }
 
+    /// Appends a time and the three bytes of a change. The last digits, the line's end and the change make one word: what
+    /// is stored in pieces cannot be loaded as a whole without a stall.
     #[inline]
-    fn set(&mut self, time: u64) {
-        let (high, low) = (time / 10_000, (time % 10_000) as u16);
-        if high != self.high || high == 0 {
-            self.high = high;
-            let mut digits = itoa::Buffer::new();
-            let digits = digits.format(if high == 0 { time } else { high }).as_bytes();
-            self.high_end = 1 + digits.len();
-            self.text[1..self.high_end].copy_from_slice(digits);
-            if high == 0 {
-                self.text[self.high_end] = b'\n';
-                self.end = self.high_end + 1;
-                return;
-            }
+    fn append(&mut self, out: &mut Vec<u8>, time: u64, change: [u8; 3]) {
+        let (high, low) = (time / 10_000, time % 10_000);
+        if high == 0 {
+            out.push(b'#');
+            out.extend_from_slice(itoa::Buffer::new().format(time).as_bytes());
+            out.push(b'\n');
+            out.extend_from_slice(&change);
+            return;
         }
-        let digit = |value: u16| b'0' + (value % 10) as u8;
-        let tail = [digit(low / 1000), digit(low / 100), digit(low / 10), digit(low), b'\n'];
-        self.end = self.high_end + tail.len();
-        self.text[self.high_end..self.end].copy_from_slice(&tail);
-    }
-
-    /// A copy of fixed length is cheaper than one of the right length.
-    #[inline]
-    fn append_to(&self, out: &mut Vec<u8>) {
-        let length = out.len() + self.end;
-        out.extend_from_slice(&self.text);
-        out.truncate(length);
+        if high != self.high {
+            let mut digits = itoa::Buffer::new();
+            let digits = digits.format(high).as_bytes();
+            self.high = high;
+            self.length = 1 + digits.len();
+            self.head[1..self.length].copy_from_slice(digits);
+        }
+        let end = out.len() + self.length;
+        out.extend_from_slice(&self.head); // a copy of fixed length is cheaper than one of the right length
+        out.truncate(end);
+        let digit = |value: u64| u64::from(b'0') + value % 10;
+        let [a, b, c] = change.map(u64::from);
+        let word = digit(low / 1000)
+            | digit(low / 100) << 8
+            | digit(low / 10) << 16
+            | digit(low) << 24
+            | u64::from(b'\n') << 32
+            | a << 40
+            | b << 48
+            | c << 56;
+        out.extend_from_slice(&word.to_le_bytes());
     }
 }
 
@@ -99,12 +105,6 @@ impl<W: Write> VcdWriter<W> {
         Self { out, changes, per_tick, servo_ticks, stamp: Stamp::new(), time: None, end: 0 }
     }
 
-    fn time(&mut self, ticks: u64) {
-        self.stamp.set(ticks * self.per_tick);
-        self.stamp.append_to(&mut self.out.text);
-        self.time = Some(ticks);
-    }
-
     /// The first error of the writer, if there was one; nothing was written after it.
     pub const fn error(&self) -> Option<&io::Error> {
         self.out.error()
@@ -116,7 +116,8 @@ impl<W: Write> VcdWriter<W> {
     /// The first error of the writer.
     pub fn finish(mut self) -> io::Result<W> {
         if self.time != Some(self.end) {
-            self.time(self.end);
+            let text = format!("#{}\n", self.end * self.per_tick);
+            self.out.text.extend_from_slice(text.as_bytes());
         }
         self.out.finish()
     }
@@ -154,12 +155,13 @@ fn header(
 
 impl<W: Write> Observer for VcdWriter<W> {
     fn edge(&mut self, edge: &Edge) {
-        if self.time != Some(edge.time) {
-            self.time(edge.time);
-        }
-        if let Some(joint) = self.changes.get(usize::from(edge.joint)) {
-            let line = &joint[usize::from(edge.line == Line::Step)];
-            self.out.text.extend_from_slice(&line[usize::from(edge.level)]);
+        let Some(joint) = self.changes.get(usize::from(edge.joint)) else { return };
+        let change = joint[usize::from(edge.line == Line::Step)][usize::from(edge.level)];
+        if self.time == Some(edge.time) {
+            self.out.text.extend_from_slice(&change);
+        } else {
+            self.stamp.append(&mut self.out.text, edge.time * self.per_tick, change);
+            self.time = Some(edge.time);
         }
         self.out.spill();
     }
@@ -260,10 +262,9 @@ mod tests {
         let mut stamp = Stamp::new();
         let times = [0, 7, 42, 9999, 10_000, 10_001, 19_999, 20_000, 123_456_789, 123_459_999, 5, 99_990_000];
         for time in times.into_iter().chain([u64::MAX, u64::MAX - 9999]) {
-            stamp.set(time);
             let mut text = b"x".to_vec();
-            stamp.append_to(&mut text);
-            assert_eq!(String::from_utf8_lossy(&text), format!("x#{time}\n"));
+            stamp.append(&mut text, time, *b"1!\n");
+            assert_eq!(String::from_utf8_lossy(&text), format!("x#{time}\n1!\n"));
         }
     }
 }

@@ -239,8 +239,8 @@ impl Crossings {
         let r0 = self.offset(base);
         let d = (target - self.position) as f64 / ONE;
         // no cubic with such a slope stays within the steps allowed; also keeps the coefficients finite
-        let wildest = m1.abs().max(d.abs());
-        if wildest > 64.0 * (max_steps as f64 + 1.0) {
+        let wildest = m0.abs().max(m1.abs()).max(d.abs());
+        if wildest.is_nan() || wildest > 64.0 * (max_steps as f64 + 1.0) {
             return Err(EdgeError::TooFast { steps: wildest as u64, max: max_steps });
         }
         let cubic = Cubic { base, c0: r0, c1: m0, c2: 3.0 * d - 2.0 * m0 - m1, c3: (m0 + m1) - 2.0 * d };

@@ -174,8 +174,8 @@ impl Stepgen {
                 // of the other types, late steps still come
                 generator.stand_at(generator.count())
             };
-            for (queue, line) in queues.into_iter().zip(lines) {
-                values.put_edges(*line, queue, end);
+            for (queue, line) in queues.iter_mut().zip(lines) {
+                values.put_edges(*line, std::mem::take(queue), end);
             }
             result.map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error })?;
         }
