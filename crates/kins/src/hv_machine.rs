@@ -10,7 +10,9 @@
 
 use crate::errors::{ForwardError, GeometryError, InverseError, Key};
 use crate::hv_mill::{HeadParameters, HvMill, HvMillParameters, HvState, Spindle};
-use crate::kinematics::{Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity};
+use crate::kinematics::{
+    Branches, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity,
+};
 use crate::moma_4s::Moma4sParameters;
 use crate::pose::{Axis, AxisSet, Pose};
 use crate::vector::Vec3;
@@ -167,7 +169,6 @@ impl HvMachine {
     }
 
     /// The same state in the coordinates of the active mechanism alone.
-    #[cfg(feature = "nalgebra")]
     pub(crate) fn mechanism_pose(&self, pose: &Pose) -> Pose {
         let state = self.state(pose);
         let [x, y, z] = state.w;
@@ -308,5 +309,37 @@ impl Kinematics for HvMachine {
     fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
         let s = self.mechanism().singularity_of(&self.state(pose))?;
         Ok(Singularity { inverse_joint: s.inverse_joint.saturating_add(self.first_joint()), ..s })
+    }
+
+    fn inverse_branches(&self, pose: &Pose) -> Result<Branches<Joints>, InverseError> {
+        let state = self.state(pose);
+        let mut all = Branches::new();
+        for q in self.mechanism().inverse_branches(&self.mechanism_pose(pose))?.as_slice() {
+            all.push(self.pack([q[0], q[1], q[2]], &state, self.held, self.held_head));
+        }
+        Ok(all)
+    }
+
+    fn forward_branches(&self, p: &Joints, seed: &Pose) -> Result<Branches<Pose>, ForwardError> {
+        let head = if self.head { p[6] } else { 0.0 };
+        let mut own = [0.0; MAX_JOINTS];
+        [own[0], own[1], own[2], own[3], own[4]] = match self.active {
+            Spindle::H => [p[0], p[1], p[4], p[5], 0.0],
+            Spindle::V => [p[2], p[3], p[4], p[5], head],
+        };
+        let mut all = Branches::new();
+        for found in self.mechanism().forward_branches(&own, seed)?.as_slice() {
+            let mut pose = *seed;
+            let w = [found.x, found.y, found.z];
+            match self.active {
+                Spindle::H => ([pose.x, pose.y, pose.z], pose.b) = (w, found.b),
+                Spindle::V => ([pose.u, pose.v, pose.w], pose.c) = (w, found.c),
+            }
+            if self.head && self.active == Spindle::V {
+                pose.b = found.b;
+            }
+            all.push(pose);
+        }
+        Ok(all)
     }
 }

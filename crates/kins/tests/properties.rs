@@ -445,7 +445,7 @@ fn branches_contain_the_configured_solution_and_are_solutions() {
             assert_eq!(poses.as_slice()[0], back, "{pose:?}");
         }
         let expected = match m.kind() {
-            "Planar" | "Moma" | "Moma4s" | "HvMill" => 4,
+            "Planar" | "Moma" | "Moma4s" | "HvMill" | "HvMachine" => 4,
             "MomaW" => 16,
             "OxGlide" => 2,
             "LinearDelta" => 8,
