@@ -5,6 +5,7 @@ use crate::block::Block;
 use crate::error::{Code, Error, ErrorKind};
 use crate::line::Line;
 use crate::modal::*;
+use crate::settings::Dialect;
 use pkm_canon::Canon;
 
 impl State {
@@ -78,15 +79,36 @@ impl State {
 
     /// Group 1. True if the next block depends on what the machine did.
     fn motion(&mut self, block: &Block, out: &mut Out<'_>) -> Result<bool, Error> {
-        match block.motion {
-            None => {}
-            Some(code @ (G0 | G1)) => self.straight(code, block, out)?,
-            Some(code @ (G2 | G3)) => self.arc(code, block, out)?,
-            Some(G80) => {
+        let Some(code) = block.motion else { return Ok(false) };
+        if !is_cycle(code) {
+            self.cycle_memory.old = None;
+        }
+        if !matches!(code, G5 | G5_2 | G5_3) {
+            if self.splines.is_open() && self.settings.dialect == Dialect::Pkm {
+                return Err(block.motion_error(ErrorKind::NurbsDropped { code: Code(code) }));
+            }
+            self.splines.forget();
+        }
+        match code {
+            G0 | G1 => self.straight(code, block, out)?,
+            G2 | G3 => self.arc(code, block, out)?,
+            G5 => self.cubic(block, out)?,
+            G5_1 => self.quadratic(block, out)?,
+            G5_2 => self.nurbs_point(block)?,
+            G5_3 => self.nurbs_end(block, out)?,
+            G33 => self.synchronized(block, out)?,
+            G33_1 => self.rigid_tap(block, out)?,
+            G38_2..=G38_5 => {
+                self.probe(code, block, out)?;
+                return Ok(true);
+            }
+            G76 => self.thread(block, out)?,
+            G80 => {
                 out.emit(Canon::Comment("interpreter: motion mode set to none".into()));
                 self.modal.motion = G80;
             }
-            Some(code) => return Err(block.motion_error(ErrorKind::GUnsupported { code: Code(code) })),
+            code if is_cycle(code) => self.cycle(code, block, out)?,
+            code => return Err(block.motion_error(ErrorKind::GUnsupported { code: Code(code) })),
         }
         Ok(false)
     }

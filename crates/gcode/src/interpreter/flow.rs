@@ -45,8 +45,9 @@ enum Kind {
     While(Place),
     /// The place behind the `do` line.
     Do(Place),
-    /// The place behind the `repeat` line, and how often it is still to run.
-    Repeat(Place, i64),
+    /// The place behind the `repeat` line, how often it is still to run, and whether this is the second of two
+    /// runs that count as one (see [`Flow::stale_continue`]).
+    Repeat(Place, i64, bool),
 }
 
 /// A branch or loop of the present call level; `line` tells uses of one label apart.
@@ -109,6 +110,8 @@ pub(crate) struct Flow {
     defining: bool,
     /// LinuxCNC forgets to end a `break` out of a while: the next do then runs only once.
     stale_break: bool,
+    /// LinuxCNC forgets to end a `continue` of a do: the next repeat then runs twice as often.
+    stale_continue: bool,
     text: LabelText,
 }
 
@@ -279,10 +282,13 @@ impl Interpreter {
         }
         let found = match (skip.until, word.keyword) {
             (Until::Branch, Some(Keyword::Elseif)) => self.test(word)? != 0.0,
-            (Until::Branch, Some(Keyword::Else | Keyword::Endif))
-            | (Until::Endif, Some(Keyword::Endif))
-            | (Until::Endwhile, Some(Keyword::Endwhile))
-            | (Until::Endrepeat, Some(Keyword::Endrepeat)) => true,
+            (Until::Branch, Some(Keyword::Else | Keyword::Endif)) | (Until::Endif, Some(Keyword::Endif)) => {
+                true
+            }
+            (Until::Endwhile, Some(Keyword::Endwhile)) | (Until::Endrepeat, Some(Keyword::Endrepeat)) => {
+                self.flow.stale_continue = false;
+                true
+            }
             (Until::Endsub, Some(Keyword::Endsub)) => {
                 self.flow.defining = false;
                 // LinuxCNC sets the result already where the definition is passed.
@@ -528,6 +534,7 @@ impl Interpreter {
             Keyword::Endwhile => {
                 self.nothing_more(word.operands)?;
                 let Some(Kind::While(begin)) = open else { return unknown };
+                self.flow.stale_continue = false;
                 self.seek(source, begin)?;
             }
             Keyword::Do => {
@@ -536,19 +543,25 @@ impl Interpreter {
             }
             Keyword::Repeat => {
                 let count = self.repeat_count(self.test(word)?, word)?;
-                self.open(word, here, Kind::Repeat(source.place(), count))?;
+                self.open(word, here, Kind::Repeat(source.place(), count, false))?;
                 if count <= 0 {
                     self.flow.skip = skip(Until::Endrepeat);
                 }
             }
             Keyword::Endrepeat => {
                 self.nothing_more(word.operands)?;
-                let Some(Kind::Repeat(body, left)) = open else { return unknown };
-                if left > 1 {
+                let Some(Kind::Repeat(body, left, second)) = open else { return unknown };
+                let (left, second) = match self.flow.stale_continue && !second {
+                    true => (left, true),
+                    false => (left - 1, false),
+                };
+                if left > 0 {
                     if let Some(construct) = self.flow.find(label) {
-                        construct.kind = Kind::Repeat(body, left - 1);
+                        construct.kind = Kind::Repeat(body, left, second);
                     }
                     self.seek(source, body)?;
+                } else {
+                    self.flow.stale_continue = false;
                 }
             }
             Keyword::Break | Keyword::Continue => {
@@ -560,7 +573,12 @@ impl Interpreter {
                         self.flow.skip = skip(Until::Endwhile);
                         self.flow.stale_break = self.state.settings.dialect != Dialect::Pkm;
                     }
-                    Some(Kind::Do(_)) => self.flow.skip = skip(Until::DoWhile { test: goes_on }),
+                    Some(Kind::Do(_)) => {
+                        self.flow.skip = skip(Until::DoWhile { test: goes_on });
+                        if goes_on {
+                            self.flow.stale_continue = self.state.settings.dialect != Dialect::Pkm;
+                        }
+                    }
                     _ => return unknown,
                 }
             }

@@ -3,6 +3,7 @@
 mod arcs;
 mod check;
 mod comments;
+mod cycles;
 mod end;
 mod execute;
 #[cfg(feature = "alloc")]
@@ -10,7 +11,10 @@ mod flow;
 mod modes;
 mod motion;
 mod offsets;
+mod probing;
+mod splines;
 mod state;
+mod threads;
 mod tools;
 
 use crate::block::Block;

@@ -1,5 +1,7 @@
 //! The state a program changes: modes, position, offsets, parameters, tools; and what expressions see of it.
 
+use super::cycles::CycleMemory;
+use super::splines::Splines;
 use crate::block::{Block, Reader, Setting};
 use crate::error::{Error, ErrorKind};
 use crate::expression::{Scope, Tolerance};
@@ -28,6 +30,8 @@ pub(crate) struct State {
     pub(crate) g92: [f64; 9],
     pub(crate) tool_offset: [f64; 9],
     pub(crate) rotation_deg: f64,
+    pub(crate) cycle_memory: CycleMemory,
+    pub(crate) splines: Splines,
     /// Slot of the tool in the spindle; 0 = none.
     pub(crate) loaded_slot: i32,
     /// Open calls.
@@ -52,6 +56,8 @@ impl State {
             g92: [0.0; 9],
             tool_offset: [0.0; 9],
             rotation_deg: 0.0,
+            cycle_memory: CycleMemory::default(),
+            splines: Splines::default(),
             // rs274 begins with slot 1 in force and an empty spindle.
             loaded_slot: i32::from(settings.imitates_rs274),
             call_level: 0,

@@ -1,0 +1,191 @@
+//! Moves in step with the spindle: G33, G33.1; the threading cycle G76.
+
+use super::{Out, state::State};
+use crate::block::Block;
+use crate::error::{Code, Error, ErrorKind};
+use crate::modal::*;
+use pkm_canon::{Canon, Plane, Position};
+use pkm_kins::maths;
+
+impl State {
+    fn spindle_of(&self, block: &Block) -> i32 {
+        block.get(b'$').map_or(0, |n| (n as i32).max(0))
+    }
+
+    fn needs_turning_spindle(&self, code: GCode, block: &Block) -> Result<i32, Error> {
+        let spindle = self.spindle_of(block);
+        match self.modal.spindles[(spindle & 7) as usize].turning {
+            Some(_) => Ok(spindle),
+            None => Err(block.motion_error(ErrorKind::SpindleNotTurning { code: Code(code) })),
+        }
+    }
+
+    fn pitch_word(&self, code: GCode, block: &Block) -> Result<f64, Error> {
+        let missing = ErrorKind::WordMissing { letter: 'K', code: Code(code) };
+        block.get(b'K').ok_or_else(|| block.motion_error(missing))
+    }
+
+    /// G33 K: a line with K units per turn.
+    pub(crate) fn synchronized(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        let spindle = self.needs_turning_spindle(G33, block)?;
+        let pitch = self.pitch_word(G33, block)?;
+        if block.has(b'F') {
+            let kind = ErrorKind::WordUnused { letter: 'F', users: "moves at feed" };
+            return Err(block.word_error(b'F', kind));
+        }
+        let end = self.end_point(block)?;
+        out.emit(Canon::StartSpeedFeedSync { spindle, feed_per_turn: pitch, velocity_mode: 0 });
+        out.emit(Canon::StraightFeed(Position::from_array(end)));
+        out.emit(Canon::StopSpeedFeedSync);
+        self.modal.motion = G33;
+        self.position = end;
+        Ok(())
+    }
+
+    /// G33.1 K [I]: rigid tap to the point and back.
+    pub(crate) fn rigid_tap(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        let spindle = self.needs_turning_spindle(G33_1, block)?;
+        let pitch = self.pitch_word(G33_1, block)?;
+        if block.has(b'F') {
+            let kind = ErrorKind::WordUnused { letter: 'F', users: "moves at feed" };
+            return Err(block.word_error(b'F', kind));
+        }
+        let end = self.end_point(block)?;
+        let retract_scale = block.get(b'I').unwrap_or(1.0);
+        if retract_scale < 1.0 {
+            return Err(block.word_error(b'I', ErrorKind::NegativeWord { letter: 'I', value: retract_scale }));
+        }
+        out.emit(Canon::StartSpeedFeedSync { spindle, feed_per_turn: pitch, velocity_mode: 0 });
+        out.emit(Canon::RigidTap { end: Position::from_array(end), retract_scale });
+        out.emit(Canon::StopSpeedFeedSync);
+        self.modal.motion = G33_1;
+        Ok(())
+    }
+
+    /// G76: threading in the XZ plane, in passes of falling depth.
+    pub(crate) fn thread(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+        let word = |letter: u8| {
+            let missing = ErrorKind::WordMissing { letter: letter.into(), code: Code(G76) };
+            block.get(letter).ok_or_else(|| block.motion_error(missing))
+        };
+        if self.modal.plane != Plane::Xz {
+            return Err(block.motion_error(ErrorKind::ThreadPlane));
+        }
+        if self.modal.compensation.is_some() {
+            return Err(block.motion_error(ErrorKind::CcOn { what: "G76" }));
+        }
+        let (pitch, mut i, mut j, mut k) = (word(b'P')?, word(b'I')?, word(b'J')?, word(b'K')?);
+        if self.modal.diameter {
+            (i, j, k) = (i / 2.0, j / 2.0, k / 2.0);
+        }
+        for (letter, wrong) in [(b'I', i == 0.0), (b'J', j <= 0.0), (b'K', k <= j)] {
+            if wrong {
+                return Err(block.word_error(letter, ErrorKind::ThreadIjk { letter: letter.into() }));
+            }
+        }
+        let degression = block.get(b'R').unwrap_or(1.0);
+        if degression < 1.0 {
+            return Err(block.word_error(b'R', ErrorKind::ThreadIjk { letter: 'R' }));
+        }
+        let spindle = self.needs_turning_spindle(G76, block)?;
+        let end = self.end_point(block)?;
+        if [1, 3, 4, 5, 6, 7, 8].iter().any(|axis| end[*axis] != self.position[*axis]) {
+            return Err(block.motion_error(ErrorKind::ThreadAxes));
+        }
+        let taper = block.get(b'L').unwrap_or(0.0) as i32;
+        let thread = Thread {
+            pitch,
+            taper_in: matches!(taper, 1 | 3),
+            taper_out: matches!(taper, 2 | 3),
+            taper_length: block.get(b'E').unwrap_or(0.0),
+            full_depth: i.abs() + k,
+            tangent: maths::tan(block.get(b'Q').unwrap_or(0.0) * maths::PI / 180.0),
+            start: self.position,
+            end_x: end[0],
+            end_z: end[2],
+            inside: i > 0.0,
+            spindle,
+        };
+        // n-th pass at depth |I| + J n^(1/R) while above the full depth; then the full depth 1 + H times.
+        let mut pass = 1.0;
+        let mut depth = i.abs() + j;
+        while depth < thread.full_depth {
+            thread.pass(depth, i.abs(), self.modal.feed_override, out);
+            pass += 1.0;
+            depth = i.abs() + j * maths::pow(pass, 1.0 / degression);
+        }
+        let spring = block.get(b'H').map_or(0, |h| h as i64).max(0);
+        for _ in 0..=spring {
+            thread.pass(thread.full_depth, i.abs(), self.modal.feed_override, out);
+        }
+        out.emit(Canon::StraightTraverse(Position::from_array(end)));
+        self.modal.motion = G76;
+        self.position = end;
+        Ok(())
+    }
+}
+
+/// One G76.
+struct Thread {
+    pitch: f64,
+    taper_in: bool,
+    taper_out: bool,
+    taper_length: f64,
+    full_depth: f64,
+    tangent: f64,
+    start: [f64; 9],
+    end_x: f64,
+    end_z: f64,
+    /// An inside thread: the material is at larger X.
+    inside: bool,
+    spindle: i32,
+}
+
+impl Thread {
+    fn at(&self, depth: f64, z: f64) -> Position {
+        let mut point = self.start;
+        point[0] += if self.inside { depth } else { -depth };
+        point[2] = z;
+        Position::from_array(point)
+    }
+
+    /// One pass at a depth measured from the drive line.
+    fn pass(&self, depth: f64, peak: f64, override_was_on: bool, out: &mut Out<'_>) {
+        let _ = (self.end_x, peak);
+        let forward = if self.end_z > self.start[2] { 1.0 } else { -1.0 };
+        let z_start = self.start[2] - forward * (depth - peak) * self.tangent;
+        let z_end = self.end_z - forward * (depth - peak) * self.tangent;
+        let taper_pitch = |slope_depth: f64| {
+            if self.taper_length > 0.0 {
+                self.pitch * maths::hypot(self.taper_length, slope_depth) / self.taper_length
+            } else {
+                self.pitch
+            }
+        };
+        let spindle = self.spindle;
+        let sync = |feed_per_turn| Canon::StartSpeedFeedSync { spindle, feed_per_turn, velocity_mode: 0 };
+        let entry = if self.taper_in { 0.0 } else { depth };
+        out.emit(Canon::StraightTraverse(self.at(0.0, z_start)));
+        out.emit(Canon::StraightTraverse(self.at(entry, z_start)));
+        if override_was_on {
+            out.emit(Canon::FeedOverride(false));
+        }
+        if self.taper_in {
+            out.emit(sync(taper_pitch(depth)));
+            out.emit(Canon::StraightFeed(self.at(depth, z_start + forward * self.taper_length)));
+        }
+        out.emit(sync(self.pitch));
+        if self.taper_out {
+            out.emit(Canon::StraightFeed(self.at(depth, z_end - forward * self.taper_length)));
+            out.emit(sync(taper_pitch(depth)));
+            out.emit(Canon::StraightFeed(self.at(0.0, z_end)));
+        } else {
+            out.emit(Canon::StraightFeed(self.at(depth, z_end)));
+        }
+        out.emit(Canon::StopSpeedFeedSync);
+        out.emit(Canon::StraightTraverse(self.at(0.0, z_end)));
+        if override_was_on {
+            out.emit(Canon::FeedOverride(true));
+        }
+    }
+}
