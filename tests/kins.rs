@@ -218,6 +218,12 @@ fn hv_mill_matches_the_vectors() {
                 assert_near(&inverse[i]["joints"][j], &row[5 + j], &context);
                 assert_near(&forward[i]["pose"][["x", "y", "z"][j]], &row[j], &context);
             }
+            // Rotary joints and axes are degrees on both sides.
+            let rotary = if vertical { &["c", "b"][..] } else { &["b"] };
+            for (j, letter) in rotary.iter().enumerate() {
+                assert_near(&inverse[i]["joints"][3 + j], &row[3 + j], &context);
+                assert_near(&forward[i]["pose"][letter], &row[3 + j], &context);
+            }
         }
         // Columns of the machine in letter order X Y Z B (C); of the vectors w1 w2 w3 table head.
         let columns: &[usize] = if vertical { &[0, 1, 2, 4, 3] } else { &[0, 1, 2, 3] };
