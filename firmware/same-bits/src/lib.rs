@@ -1,5 +1,8 @@
-//! One number for all results of all mechanisms: FNV-1a over the bits of joints, poses, derivatives and error codes' cases.
+//! One number for all results of all mechanisms: FNV-1a over the bits of joints, poses, derivatives and error codes' cases,
+//! and over the edges of a step generator.
 #![no_std]
+
+pub mod steps;
 
 use pkm_kins::maths::radians;
 use pkm_kins::*;
@@ -141,6 +144,7 @@ pub fn kinematics(count: u32) -> (u64, u32) {
         ..Pose::ZERO
     };
     add(Hexapod::new(&hexapod).ok().map(Into::into), pose(-1.0), pose(1.0));
+    hash.word(steps::hash());
     (hash.0, reachable)
 }
 
