@@ -377,7 +377,8 @@ fn joints_are_continuous_along_paths_near_singularities() {
         let m = &case.mechanism;
         let (mut steps, mut nearest) = (0, 1.0_f64);
         for _ in 0..count / 200 {
-            let (Some(a), Some(b)) = (case.edge_pose(rng), case.edge_pose(rng)) else { continue };
+            let mut edge = || (0..40).find_map(|_| case.edge_pose(rng));
+            let (Some(a), Some(b)) = (edge(), edge()) else { break };
             let mut before: Option<(Pose, Joints)> = None;
             const N: usize = 200;
             for k in 0..=N {
@@ -419,7 +420,7 @@ fn joints_are_continuous_along_paths_near_singularities() {
                 before = Some((pose, joints));
             }
         }
-        if case.edge_pose(rng).is_some() {
+        if (0..40).any(|_| case.edge_pose(rng).is_some()) {
             assert!(steps > count / 100, "{steps} steps");
             // Those whose edge is a singularity came near it (Lambda's edge is its spacing limit).
             if matches!(m.kind(), "Moma4s" | "OxGlide" | "LinearDelta") {
