@@ -38,20 +38,15 @@ pub(crate) fn run(arguments: &Machines) -> Result<Outcome, Failure> {
         Format::Text => {
             let mut table = Table::new();
             table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
-            table.set_header(["name", "mechanism", "axes", "joints", "description"]);
+            table.set_header(["name", "mechanism", "axes", "joints", "description", "source"]);
             for row in &rows {
-                table.add_row([
-                    &row.name,
-                    &row.mechanism,
-                    &row.axes,
-                    &row.joints.join(" "),
-                    &row.description,
-                ]);
+                let joints = row.joints.join(" ");
+                table.add_row([&row.name, &row.mechanism, &row.axes, &joints, &row.description, &row.source]);
             }
             for line in table.lines() {
                 writeln!(out, "{}", line.trim_end())?;
             }
-            writeln!(out, "\n`pkm machines NAME` prints a machine file with its sources.")?;
+            writeln!(out, "\n`pkm machines NAME` prints the annotated machine file.")?;
         }
     }
     Ok(Outcome::Clean)
