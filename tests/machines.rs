@@ -14,7 +14,9 @@ fn machines_lists_every_file_of_the_folder() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../machines");
     let mut files: Vec<String> = std::fs::read_dir(folder)
         .unwrap()
-        .map(|entry| entry.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned())
+        .filter_map(|entry| {
+            entry.unwrap().file_name().to_str().unwrap().strip_suffix(".toml").map(str::to_owned)
+        })
         .collect();
     files.sort_unstable();
     assert_eq!(listed, files);
@@ -144,4 +146,16 @@ fn a_closed_pipe_is_success_and_a_full_disk_is_not() {
         .unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("cannot write"), "{output:?}");
+}
+
+#[test]
+fn the_reference_of_the_keys_is_complete() {
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../machines/README.md")).unwrap();
+    for kind in pkm_machine::kinematics::TYPES {
+        assert!(text.contains(&format!("`{kind}`")), "kinematics.type {kind} is not in machines/README.md");
+    }
+    for (model, _) in pkm_machine::drivers::DRIVERS {
+        assert!(text.contains(model), "driver {model} is not in machines/README.md");
+    }
 }
