@@ -234,7 +234,7 @@ fn write_command(out: &mut Buffer, command: &Canon<'_>, spelling: Spelling, plan
         Canon::StartSpeedFeedSync { feed_per_turn, velocity_mode, .. } => {
             out.put(b"START_SPEED_FEED_SYNC(");
             out.number(feed_per_turn, 6);
-            out.put(b", ");
+            out.put(b",");
             out.integer(velocity_mode.into());
             out.put(b")");
         }

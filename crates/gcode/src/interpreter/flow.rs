@@ -3,6 +3,7 @@
 //! The source is read line by line and sought back for loops and calls, so a program of any length needs no memory
 //! of its own. What is remembered: the places of subs already passed, and for every open call its flow labels.
 
+use super::saved::Saved;
 use super::{Interpreter, Out, Status};
 use crate::error::{Error, ErrorKind};
 use crate::expression::{self, Scope};
@@ -246,27 +247,28 @@ impl Interpreter {
         }
     }
 
-    /// An o-word line. `here` is the place of the line itself.
+    /// An o-word line. `here` is the place of the line itself. The result is the state that M73 wants back.
     pub(super) fn o_word(
         &mut self,
         start: usize,
         here: Place,
         source: &mut dyn LineSource,
-    ) -> Result<(), Error> {
+    ) -> Result<Option<Saved>, Error> {
         let word = self.read_o_word(start)?;
         if self.flow.defining && word.keyword == Some(Keyword::Sub) {
             return Err(self.flow_error(ErrorKind::ONestedSub, word.span));
         }
         if self.flow.skip.is_some() {
-            return self.skipped_o_word(&word, here, source);
+            return self.skipped_o_word(&word, here, source).map(|()| None);
         }
         match word.keyword {
-            None => self.fanuc_program(&word, here, source),
-            Some(Keyword::Sub) => self.define(&word, here, source),
-            Some(Keyword::Endsub | Keyword::Return) => self.return_from(&word, source),
-            Some(Keyword::Call) => self.call(&word, source),
-            Some(keyword) => self.branch_or_loop(keyword, &word, here, source),
+            None => self.fanuc_program(&word, here, source)?,
+            Some(Keyword::Sub) => self.define(&word, here, source)?,
+            Some(Keyword::Endsub | Keyword::Return) => return self.return_from(&word, source),
+            Some(Keyword::Call) => self.call(&word, source)?,
+            Some(keyword) => self.branch_or_loop(keyword, &word, here, source)?,
         }
+        Ok(None)
     }
 
     /// While lines are skipped only the o-word that ends the skipping counts.
@@ -422,7 +424,7 @@ impl Interpreter {
     }
 
     /// `endsub [e]`, `return [e]`.
-    fn return_from(&mut self, word: &OWord, source: &mut dyn LineSource) -> Result<(), Error> {
+    fn return_from(&mut self, word: &OWord, source: &mut dyn LineSource) -> Result<Option<Saved>, Error> {
         let Some(frame) = self.flow.frames.last() else {
             return Err(self.flow_error(ErrorKind::ONotInSub, word.span));
         };
@@ -434,21 +436,23 @@ impl Interpreter {
             None => (None, word.operands),
         };
         self.nothing_more(at)?;
-        self.leave(source)?;
+        let saved = self.leave(source)?;
         self.state.set_return_value(value);
-        Ok(())
+        Ok(saved)
     }
 
-    fn leave(&mut self, source: &mut dyn LineSource) -> Result<(), Error> {
-        let Some(frame) = self.flow.frames.pop() else { return Ok(()) };
+    fn leave(&mut self, source: &mut dyn LineSource) -> Result<Option<Saved>, Error> {
+        let Some(frame) = self.flow.frames.pop() else { return Ok(None) };
+        let saved = self.state.forget_saved();
         self.flow.constructs.truncate(frame.first_construct);
         let arguments = (frame.style == Style::OWord).then_some(frame.arguments);
         self.state.leave_sub(arguments);
-        self.seek(source, frame.return_to)
+        self.seek(source, frame.return_to)?;
+        Ok(saved)
     }
 
     /// M98 P L: calls a Fanuc program L times.
-    pub(super) fn fanuc_call(&mut self, source: &mut dyn LineSource) -> Result<(), Error> {
+    fn fanuc_call(&mut self, source: &mut dyn LineSource) -> Result<(), Error> {
         let span = self.block.m_span(crate::modal::MGroup::Call);
         let Some(p) = self.block.get(b'P') else {
             return Err(self.flow_error(ErrorKind::M98NoP, span));
@@ -469,7 +473,7 @@ impl Interpreter {
     }
 
     /// M99: returns from a Fanuc program. False at the main level, where it ends the program.
-    pub(super) fn fanuc_return(&mut self, source: &mut dyn LineSource) -> Result<bool, Error> {
+    fn fanuc_return(&mut self, source: &mut dyn LineSource, out: &mut Out<'_>) -> Result<bool, Error> {
         let span = self.block.m_span(crate::modal::MGroup::Stop);
         let Some(frame) = self.flow.frames.last_mut() else { return Ok(false) };
         if frame.style == Style::OWord {
@@ -480,7 +484,9 @@ impl Interpreter {
             let body = frame.body;
             self.seek(source, body)?;
         } else {
-            self.leave(source)?;
+            if let Some(saved) = self.leave(source)? {
+                self.state.restore(&saved, span, out)?;
+            }
         }
         Ok(true)
     }
@@ -616,13 +622,13 @@ impl Interpreter {
     pub(super) fn program_call(
         &mut self,
         source: &mut dyn LineSource,
-        _out: &mut Out<'_>,
+        out: &mut Out<'_>,
     ) -> Result<Option<Status>, Error> {
         if self.block.has_m(98) {
             self.fanuc_call(source)?;
             return Ok(Some(Status::Running));
         }
-        if self.block.has_m(99) && self.flow.depth() > 0 && self.fanuc_return(source)? {
+        if self.block.has_m(99) && self.flow.depth() > 0 && self.fanuc_return(source, out)? {
             return Ok(Some(Status::Running));
         }
         Ok(None)

@@ -12,6 +12,7 @@ mod modes;
 mod motion;
 mod offsets;
 mod probing;
+mod saved;
 mod splines;
 mod state;
 mod threads;
@@ -279,7 +280,7 @@ impl Interpreter {
         let start = self.line.skip_number()?;
         self.state.source_line = self.line.number;
         if self.line.code().get(start) == Some(&b'o') {
-            return self.control(start, here, source);
+            return self.control(start, here, source, sink);
         }
         if self.is_skipping() {
             return Ok(Status::Running);
@@ -305,8 +306,18 @@ impl Interpreter {
     }
 
     #[cfg(feature = "alloc")]
-    fn control(&mut self, start: usize, here: Place, source: &mut dyn LineSource) -> Result<Status, Error> {
-        self.o_word(start, here, source).map(|()| Status::Running)
+    fn control(
+        &mut self,
+        start: usize,
+        here: Place,
+        source: &mut dyn LineSource,
+        sink: &mut dyn CanonSink,
+    ) -> Result<Status, Error> {
+        let span = self.line.whole();
+        if let Some(saved) = self.o_word(start, here, source)? {
+            self.state.restore(&saved, span, &mut Out { sink, span })?;
+        }
+        Ok(Status::Running)
     }
 
     #[cfg(feature = "alloc")]
@@ -318,7 +329,13 @@ impl Interpreter {
 /// Without memory there are no o-words; each is refused by name.
 #[cfg(not(feature = "alloc"))]
 impl Interpreter {
-    fn control(&mut self, start: usize, _: Place, _: &mut dyn LineSource) -> Result<Status, Error> {
+    fn control(
+        &mut self,
+        start: usize,
+        _: Place,
+        _: &mut dyn LineSource,
+        _: &mut dyn CanonSink,
+    ) -> Result<Status, Error> {
         let span = self.line.code_span(start, self.line.code().len());
         Err(Error { kind: ErrorKind::ONoMemory, span })
     }

@@ -109,9 +109,7 @@ impl State {
                 }
             }
             Some(19) => self.orient(block, out)?,
-            Some(number) => {
-                return Err(block.m_error(MGroup::Spindle, ErrorKind::MUnsupported { number }));
-            }
+            Some(number) => self.save_or_restore(number, block, out)?,
             None => {}
         }
         Ok(())

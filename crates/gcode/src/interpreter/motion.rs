@@ -102,7 +102,7 @@ impl State {
         let [x, y, ..] = self.position;
         let (present_radius, present_angle) = (maths::hypot(x, y), maths::atan2(y, x));
         let (radius, angle) = (block.get(b'@'), block.get(b'^').map(maths::radians));
-        if angle.is_none() && x == 0.0 && y == 0.0 {
+        if (angle.is_none() || self.modal.incremental) && x == 0.0 && y == 0.0 {
             return Err(block.word_error(b'@', ErrorKind::PolarOrigin));
         }
         let (radius, angle) = if self.modal.incremental {

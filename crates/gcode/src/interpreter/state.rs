@@ -1,6 +1,7 @@
 //! The state a program changes: modes, position, offsets, parameters, tools; and what expressions see of it.
 
 use super::cycles::CycleMemory;
+use super::saved::SavedStates;
 use super::splines::Splines;
 use crate::block::{Block, Reader, Setting};
 use crate::error::{Error, ErrorKind};
@@ -32,6 +33,7 @@ pub(crate) struct State {
     pub(crate) rotation_deg: f64,
     pub(crate) cycle_memory: CycleMemory,
     pub(crate) splines: Splines,
+    pub(crate) saved: SavedStates,
     /// Slot of the tool in the spindle; 0 = none.
     pub(crate) loaded_slot: i32,
     /// Open calls.
@@ -58,6 +60,7 @@ impl State {
             rotation_deg: 0.0,
             cycle_memory: CycleMemory::default(),
             splines: Splines::default(),
+            saved: SavedStates::default(),
             // rs274 begins with slot 1 in force and an empty spindle.
             loaded_slot: i32::from(settings.imitates_rs274),
             call_level: 0,
