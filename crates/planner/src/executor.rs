@@ -343,7 +343,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             joint_velocity: if at_rest { Default::default() } else { motion.velocity },
             motion: piece.motion,
             s,
-            blending: matches!(piece.geometry, crate::path::Geometry::Blend(_)),
+            blending: piece.corner,
             span: piece.span,
             state,
         };

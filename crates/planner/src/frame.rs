@@ -4,16 +4,14 @@
 //! as LinuxCNC's canon layer applies it). Lengths become mm, angles radians.
 
 use crate::limits::Feed;
-use crate::path::{Arc, FeedGroup, Geometry, Line, Tolerance, Vector, combine, feed_group};
+use crate::path::{Arc, FeedGroup, Geometry, Line, Spline, Tolerance, Vector, combine, feed_group};
 use crate::planner::{Move, PathMode};
-use pkm_canon::{Canon, LengthUnit, MotionControlMode, Plane, Position, Span};
+use pkm_canon::{Canon, ControlPoint, MotionControlMode, Plane, Position, Span};
 use pkm_kins::maths::radians;
 
 /// What a canonical command asks of the machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Event {
-    /// Nothing moves and nothing stops: a state change.
-    None,
     /// A move.
     Move(Move),
     /// Stop and wait.
@@ -23,6 +21,8 @@ pub enum Event {
     },
     /// Stop and let the operator or the end of the program have its turn.
     Stop,
+    /// A motion this planner cannot make: the program must not run.
+    Unsupported(&'static str),
 }
 
 /// The state between program and machine coordinates.
@@ -70,43 +70,37 @@ impl Frame {
         &self.position
     }
 
-    /// Takes one command.
-    pub fn apply(&mut self, command: &Canon<'_>, span: Span) -> Event {
+    /// Takes one command and calls `emit` with what it asks of the machine; state changes ask nothing.
+    pub fn apply(&mut self, command: &Canon<'_>, span: Span, mut emit: impl FnMut(Event)) {
         match *command {
-            Canon::StraightTraverse(to) => self.line(to, true, span),
-            Canon::StraightFeed(to) => self.line(to, false, span),
+            Canon::StraightTraverse(to) => self.line(to, true, span, emit),
+            Canon::StraightFeed(to) => self.line(to, false, span, emit),
             Canon::ArcFeed { end, first_centre, second_centre, turns } => {
-                self.arc(end, first_centre, second_centre, turns, span)
+                self.arc(end, [first_centre, second_centre], turns, span, emit);
+            }
+            Canon::NurbsFeed { points, order } => self.spline(points, order, span, emit),
+            Canon::StraightProbe { .. } => emit(Event::Unsupported("probing (G38.2 to G38.5)")),
+            Canon::RigidTap { .. } => emit(Event::Unsupported("rigid tapping (G33.1)")),
+            Canon::StartSpeedFeedSync { .. } => {
+                emit(Event::Unsupported("motion in step with the spindle (G33, G76)"));
             }
             Canon::Dwell(seconds) => {
                 let ns = seconds.clamp(0.0, 1e9) * 1e9;
-                Event::Dwell { ns: pkm_kins::maths::round(ns) as u64 }
+                emit(Event::Dwell { ns: pkm_kins::maths::round(ns) as u64 });
             }
-            Canon::ProgramStop | Canon::ProgramEnd | Canon::Finish => Event::Stop,
-            Canon::SetFeedRate(rate) => self.set(|f| f.feed_rate = rate),
-            Canon::SetFeedMode { mode, .. } => self.set(|f| f.per_turn = mode == 1),
-            Canon::SetSpindleSpeed { speed, .. } => self.set(|f| f.spindle_rpm = speed.abs()),
-            Canon::UseLengthUnits(unit) => self.set(|f| f.unit_mm = LengthUnit::mm(unit)),
-            Canon::SelectPlane(plane) => self.set(|f| f.plane = plane),
-            Canon::SetG5xOffset { offset, .. } => {
-                let offset = self.scaled(offset);
-                self.set(|f| f.g5x = offset)
-            }
-            Canon::SetG92Offset(offset) => {
-                let offset = self.scaled(offset);
-                self.set(|f| f.g92 = offset)
-            }
-            Canon::UseToolLengthOffset(offset) => {
-                let offset = self.scaled(offset);
-                self.set(|f| f.tool = offset)
-            }
-            Canon::SetXyRotation(degrees) => {
-                let (c, s) = pkm_kins::maths::cos_sin_deg(degrees);
-                self.set(|f| f.rotation = (c, s))
-            }
+            Canon::ProgramStop | Canon::ProgramEnd | Canon::Finish => emit(Event::Stop),
+            Canon::SetFeedRate(rate) => self.feed_rate = rate,
+            Canon::SetFeedMode { mode, .. } => self.per_turn = mode == 1,
+            Canon::SetSpindleSpeed { speed, .. } => self.spindle_rpm = speed.abs(),
+            Canon::UseLengthUnits(unit) => self.unit_mm = unit.mm(),
+            Canon::SelectPlane(plane) => self.plane = plane,
+            Canon::SetG5xOffset { offset, .. } => self.g5x = self.scaled(offset),
+            Canon::SetG92Offset(offset) => self.g92 = self.scaled(offset),
+            Canon::UseToolLengthOffset(offset) => self.tool = self.scaled(offset),
+            Canon::SetXyRotation(degrees) => self.rotation = pkm_kins::maths::cos_sin_deg(degrees),
             Canon::SetMotionControlMode(mode) => {
                 let p = self.default_tolerance;
-                let mode = match mode {
+                self.mode = match mode {
                     MotionControlMode::ExactStop => PathMode::ExactStop,
                     MotionControlMode::ExactPath => PathMode::ExactPath,
                     MotionControlMode::Continuous { tolerance } if tolerance > 0.0 => {
@@ -114,15 +108,10 @@ impl Frame {
                     }
                     _ => PathMode::Blend(p),
                 };
-                self.set(|f| f.mode = mode)
             }
-            _ => Event::None,
+            // Spindle, coolant, tool, messages: nothing moves, and nothing stops for them.
+            _ => {}
         }
-    }
-
-    fn set(&mut self, change: impl FnOnce(&mut Self)) -> Event {
-        change(self);
-        Event::None
     }
 
     /// mm and rad, still in program coordinates.
@@ -156,48 +145,88 @@ impl Frame {
         Feed { speed: self.feed_rate * unit * per_second, group }
     }
 
-    fn line(&mut self, to: Position, rapid: bool, span: Span) -> Event {
+    fn line(&mut self, to: Position, rapid: bool, span: Span, mut emit: impl FnMut(Event)) {
         let end = self.machine(self.scaled(to));
         let start = self.position;
         self.position = end;
-        let Some(line) = Line::new(start, end) else { return Event::None };
+        let Some(line) = Line::new(start, end) else { return };
         let group = feed_group(&combine(&end, &start, |b, a| b - a));
         let feed = if rapid { Feed { speed: f64::INFINITY, group } } else { self.feed(group) };
-        Event::Move(Move { geometry: Geometry::Line(line), feed, rapid, mode: self.mode, span })
+        emit(Event::Move(Move { geometry: Geometry::Line(line), feed, rapid, mode: self.mode, span }));
     }
 
-    fn arc(&mut self, end: Position, first: f64, second: f64, turns: i32, span: Span) -> Event {
+    /// The machine's XYZ indices of the plane's first and second axis and of its normal.
+    fn plane_axes(&self) -> [usize; 3] {
+        match self.plane {
+            Plane::Xy | Plane::Uv => [0, 1, 2],
+            Plane::Xz | Plane::Uw => [2, 0, 1],
+            Plane::Yz | Plane::Vw => [1, 2, 0],
+        }
+    }
+
+    fn arc(&mut self, end: Position, centre: [f64; 2], turns: i32, span: Span, mut emit: impl FnMut(Event)) {
         let program_end = self.scaled(end);
-        let (first, second) = (first * self.unit_mm, second * self.unit_mm);
+        let [first, second, normal] = self.plane_axes();
         // The centre lies in the plane of the end point; only its axis matters.
-        let mut centre = program_end;
-        let normal = match self.plane {
-            Plane::Xy | Plane::Uv => {
-                (centre[0], centre[1]) = (first, second);
-                [0.0, 0.0, 1.0]
-            }
-            Plane::Xz | Plane::Uw => {
-                (centre[2], centre[0]) = (first, second);
-                [0.0, 1.0, 0.0]
-            }
-            Plane::Yz | Plane::Vw => {
-                (centre[1], centre[2]) = (first, second);
-                [1.0, 0.0, 0.0]
-            }
-        };
-        let centre = self.machine(centre);
-        let normal = self.rotate(normal);
+        let mut at_centre = program_end;
+        at_centre[first] = centre[0] * self.unit_mm;
+        at_centre[second] = centre[1] * self.unit_mm;
+        let mut axis = [0.0; 3];
+        axis[normal] = 1.0;
+        let centre = self.machine(at_centre);
+        let axis = self.rotate(axis);
         let end = self.machine(program_end);
         let start = self.position;
         self.position = end;
         let feed = self.feed(FeedGroup::Xyz);
-        let geometry = match Arc::new(start, end, [centre[0], centre[1], centre[2]], normal, turns) {
+        let geometry = match Arc::new(start, end, [centre[0], centre[1], centre[2]], axis, turns) {
             Some(arc) => Geometry::Arc(arc),
             None => match Line::new(start, end) {
                 Some(line) => Geometry::Line(line),
-                None => return Event::None,
+                None => return,
             },
         };
-        Event::Move(Move { geometry, feed, rapid: false, mode: self.mode, span })
+        emit(Event::Move(Move { geometry, feed, rapid: false, mode: self.mode, span }));
+    }
+
+    /// A spline leaves the coordinates outside its plane as they are.
+    fn spline(&mut self, points: &[ControlPoint], order: u32, span: Span, mut emit: impl FnMut(Event)) {
+        let Some(spline) = Spline::new(points, order, self.unit_mm) else {
+            emit(Event::Unsupported("a spline of this order (2 to 12), number of points or weights"));
+            return;
+        };
+        let [first, second, _] = self.plane_axes();
+        let here = self.position;
+        let lift = |[a, b]: [f64; 2], direction: bool| {
+            let mut p = [0.0; 3];
+            (p[first], p[second]) = (a, b);
+            let mut v = if direction { [0.0; 9] } else { here };
+            let turned = self.rotate(p);
+            if direction {
+                (v[0], v[1], v[2]) = (turned[0], turned[1], turned[2]);
+                return v;
+            }
+            // Places in the plane, with the offsets; along the normal the tool stays.
+            let mut moved = [0.0; 9];
+            (moved[first], moved[second]) = (a, b);
+            let moved = self.machine(moved);
+            let normal = self.rotate({
+                let mut n = [0.0; 3];
+                n[3 - first - second] = 1.0;
+                n
+            });
+            let height: f64 = (0..3).map(|i| normal[i] * (here[i] - moved[i])).sum();
+            for (i, n) in normal.iter().enumerate() {
+                v[i] = moved[i] + n * height;
+            }
+            v
+        };
+        let (feed, mode) = (self.feed(FeedGroup::Xyz), self.mode);
+        let mut end = here;
+        spline.cubics(lift, |cubic| {
+            end = Geometry::Blend(cubic).at(cubic.length).position;
+            emit(Event::Move(Move { geometry: Geometry::Blend(cubic), feed, rapid: false, mode, span }));
+        });
+        self.position = end;
     }
 }

@@ -99,6 +99,8 @@ pub(crate) struct Piece {
     pub(crate) open: bool,
     /// At rest at its end.
     pub(crate) stop: bool,
+    /// A corner blend after move `motion`.
+    pub(crate) corner: bool,
     pub(crate) dwell_ns: u64,
     mode: PathMode,
     pub(crate) motion: u32,
@@ -225,6 +227,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             rapid: next.rapid,
             open: true,
             stop: false,
+            corner: false,
             dwell_ns: 0,
             mode: next.mode,
             motion,
@@ -251,6 +254,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             rapid: false,
             open: false,
             stop: true,
+            corner: false,
             dwell_ns,
             mode: PathMode::ExactStop,
             motion: self.moves.wrapping_sub(1),
@@ -313,6 +317,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             rapid: last.rapid && next.rapid,
             open: false,
             stop: false,
+            corner: true,
             ..*last
         };
         // Between short chords nothing of the line itself is left.

@@ -71,9 +71,15 @@ pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<
                     interpreter.set_machine_position_mm(face(frame.position()));
                 }
                 while let Some((event, span)) = queue.pop_front() {
-                    if let Event::Move(step) = event {
-                        checked.moves += 1;
-                        check_move(program, machine, &step, span, &mut checked);
+                    match event {
+                        Event::Move(step) => {
+                            checked.moves += 1;
+                            check_move(program, machine, &step, span, &mut checked);
+                        }
+                        Event::Unsupported(what) => {
+                            checked.add(program, messages::unsupported(program, span, what));
+                        }
+                        Event::Dwell { .. } | Event::Stop => {}
                     }
                 }
                 if status == Status::Ended {

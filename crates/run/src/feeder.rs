@@ -58,10 +58,7 @@ pub(crate) struct Events<'a> {
 
 impl CanonSink for Events<'_> {
     fn command(&mut self, command: &Canon<'_>, span: Span) {
-        match self.frame.apply(command, span) {
-            Event::None => {}
-            event => self.queue.push_back((event, span)),
-        }
+        self.frame.apply(command, span, |event| self.queue.push_back((event, span)));
     }
 }
 
@@ -212,7 +209,7 @@ impl<'a> Feeder<'a> {
 
     fn take(&mut self, event: Event, span: Span) -> Result<(), Diagnostic> {
         let pushed = match event {
-            Event::None => return Ok(()),
+            Event::Unsupported(what) => return Err(messages::unsupported(self.program, span, what)),
             Event::Stop => {
                 self.planner.finish();
                 return Ok(());

@@ -168,6 +168,19 @@ pub(crate) fn feed_unset(program: &Program, span: Span) -> Diagnostic {
     at(program, span, "feed-zero", Severity::Error, "a feed move with no feed rate".to_owned(), help)
 }
 
+/// The language knows it, the simulated machine does not.
+pub(crate) fn unsupported(program: &Program, span: Span, what: &str) -> Diagnostic {
+    let message = format!("{what} cannot be run on the simulated machine yet");
+    at(
+        program,
+        span,
+        "unsupported-motion",
+        Severity::Error,
+        message,
+        "take it out to run the rest; `pkm canon` interprets it",
+    )
+}
+
 pub(crate) fn too_many(program: &Program, kept: usize) -> Diagnostic {
     let message = format!("only the first {kept} findings are listed");
     at(program, Span::default(), "too-many", Severity::Note, message, "mend these and check again")

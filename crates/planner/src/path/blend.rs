@@ -64,7 +64,8 @@ impl Blend {
         None
     }
 
-    fn hermite(a: &Point, b: &Point, length: f64) -> Self {
+    /// The cubic from `a` to `b` with their derivatives, over a parameter length.
+    pub(super) fn hermite(a: &Point, b: &Point, length: f64) -> Self {
         let chord = combine(&b.position, &a.position, |b, a| b - a);
         let (m0, m1) = (a.first.map(|x| x * length), b.first.map(|x| x * length));
         let c2 = combine(&combine(&m0, &m1, |p, q| 2.0 * p + q), &chord, |m, c| 3.0 * c - m);

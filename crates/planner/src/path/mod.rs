@@ -7,10 +7,12 @@
 mod arc;
 mod blend;
 mod line;
+mod spline;
 
 pub use arc::Arc;
 pub use blend::{Blend, Tolerance};
 pub use line::Line;
+pub use spline::{MAX_ORDER, Spline};
 
 use pkm_kins::maths::sqrt;
 
