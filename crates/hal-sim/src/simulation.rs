@@ -476,7 +476,7 @@ impl Simulation {
     ///
     /// # Errors
     /// The mechanism's own, if the motors stand where it cannot be.
-    pub fn feedback_pose(&self, kinematics: &impl Kinematics) -> Result<Pose, ForwardError> {
+    pub fn feedback_pose(&self, kinematics: &(impl Kinematics + ?Sized)) -> Result<Pose, ForwardError> {
         let mut joints = [0.0; MAX_JOINTS];
         for (joint, line) in joints.iter_mut().zip(&self.lines) {
             let position = self.hal.values().float(line.motor_position);

@@ -4,9 +4,12 @@ mod common;
 
 use common::{SERVO_NS, Waves, config, machine, wave};
 use pkm_hal_sim::{
-    Edge, Fault, Line, Observer, Setpoint, Simulation, TickReport, TraceWriter, VcdSteps, VcdWriter,
-    Violations,
+    Edge, Fault, Line, Observer, Setpoint, Simulation, SimulationConfig, TickReport, TraceWriter, Value,
+    VcdSteps, VcdWriter, Violations,
 };
+use pkm_kins::cartesian::Cartesian;
+use pkm_kins::maths::{cos, sin};
+use pkm_kins::{Axis, AxisSet, JointKind};
 
 #[test]
 fn the_count_is_within_half_a_step_at_every_tick() {
@@ -155,4 +158,60 @@ fn the_driver_sees_what_the_conditioner_was_not_told() {
     }
     let statistics = simulation.statistics()[0];
     assert_eq!(statistics.violations.step_length, statistics.steps);
+}
+
+#[test]
+fn rotary_joints_are_rad_outside_and_degrees_at_the_pins() {
+    let mut config = config(3, 100);
+    config.joints[2].kind = JointKind::Rotary;
+    config.joints[2].steps_per_unit = -80.0 * 180.0 / std::f64::consts::PI;
+    for joint in &mut config.joints {
+        joint.start = 0.25;
+    }
+    let mut simulation = Simulation::new(&config).unwrap();
+    let kinematics = Cartesian::new(AxisSet::new(&[Axis::X, Axis::Y, Axis::B])).unwrap();
+    let at = |simulation: &Simulation, name: &str| match simulation.hal().getp(name).unwrap() {
+        Value::Float(value) => value,
+        other => panic!("{name} is {other}"),
+    };
+    // at the start half a step off at most: 0.25 rad are 14.32°, 80 steps a degree
+    assert!((at(&simulation, "joint.2.motor-pos-fb") - 14.3239).abs() < 0.5 / 80.0 + 1e-4);
+    let mut setpoint = Setpoint::default();
+    for tick in 0..=200 {
+        // from 0.25 to 0.5 and to rest, quarter turn of a cosine
+        let phase = f64::from(tick) * std::f64::consts::PI / 200.0;
+        for n in 0..3 {
+            setpoint.joints[n] = 0.25 + 0.125 * (1.0 - cos(phase));
+            setpoint.velocities[n] = 0.125 * sin(phase) * std::f64::consts::PI / 0.2;
+        }
+        simulation.tick_to(&setpoint, &mut []).unwrap();
+    }
+    assert!((at(&simulation, "joint.2.pos-cmd") - 0.5_f64.to_degrees()).abs() < 1e-12);
+    assert!((at(&simulation, "joint.2.motor-pos-fb") - 0.5_f64.to_degrees()).abs() <= 0.5 / 80.0);
+    assert!((at(&simulation, "stepgen.2.position-scale") + 80.0).abs() < 1e-9);
+    assert!(simulation.report().joints[2].count < -2000);
+    let pose = simulation.feedback_pose(&kinematics).unwrap();
+    assert!((pose.x - 0.5).abs() <= 0.5 / 400.0 + 1e-12 && (pose.y - 0.5).abs() <= 0.5 / 400.0 + 1e-12);
+    assert!((pose.b - 0.5).abs() <= (0.5_f64 / 80.0).to_radians() + 1e-12, "{pose:?}");
+    assert!((pose.b - simulation.feedback()[2]).abs() < 1e-12);
+}
+
+#[test]
+fn a_machine_that_cannot_be_is_refused() {
+    let refused = |change: fn(&mut SimulationConfig)| {
+        let mut config = config(2, 100);
+        change(&mut config);
+        Simulation::new(&config).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    assert_eq!(refused(|c| c.joints.clear()), "0 joints; a machine has 1 to 9");
+    assert_eq!(refused(|c| c.timer_period_ns = 0), "the timer period is 0 ns");
+    assert!(refused(|c| c.servo_period_ns = 0).contains("0 ns"));
+    assert!(
+        refused(|c| c.servo_period_ns = 1_000_050).contains("not a whole number of timer periods of 100 ns")
+    );
+    assert!(refused(|c| c.joints[1].steps_per_unit = 0.0).starts_with("joint 1"));
+    assert!(refused(|c| c.joints[1].steps_per_unit = f64::NAN).starts_with("joint 1"));
+    assert!(refused(|c| c.joints[0].start = f64::INFINITY).starts_with("joint 0"));
+    assert!(refused(|c| c.joints[0].start = 1e9).starts_with("joint 0"));
+    assert!(refused(|c| c.joints[0].timing.step_length = u64::MAX).contains("2^31 timer ticks"));
 }
