@@ -87,6 +87,10 @@ fn late_steps_are_dropped_and_not_counted() {
         stop_and_check(simulation.clone(), tick);
     }
     assert!(dropped > 10, "{dropped}: the test does not test");
+    // it says how late they were, and how far off
+    let statistics = simulation.statistics()[0];
+    assert!(statistics.delayed_steps >= dropped && statistics.max_delay_ns > 500_000, "{statistics:?}");
+    assert!(statistics.max_step_error > 0.7 && statistics.max_edge_error > 0.7, "{statistics:?}");
 }
 
 #[test]
