@@ -357,3 +357,24 @@ fn an_interrupted_run_says_how_far_it_came() {
     );
     assert_eq!(listing(&out), ["steps.vcd", "summary.json"]);
 }
+
+#[test]
+fn tools_come_from_the_tool_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("tool.tbl");
+    write(&table, "T1 P1 Z12.5 D6 ;mill\n");
+    let program = b"G21 G90\nT1 M6\nG43 H1\nG1 Z0 F600\nM2\n";
+    let arguments = ["run", "-", "--machine", "xyz", "--format", "json"];
+    let without = pkm_with_input(&arguments, program);
+    assert_eq!(
+        (without.status, &without.json()["diagnostics"][0]["code"]),
+        (1, &Value::from("tool-unknown"))
+    );
+    let with = [&arguments[..], &["--tool-table", table.to_str().unwrap()]].concat();
+    let run = pkm_with_input(&with, program);
+    assert_eq!(run.status, 0, "{}{}", run.stdout, run.stderr);
+    // The tip is at Z0: the carriage stands a tool's length above.
+    assert!((run.json()["joints"][2]["max"].as_f64().unwrap() - 12.5).abs() < 1e-9, "{}", run.stdout);
+    let missing = pkm_with_input(&[&arguments[..], &["--tool-table", "none.tbl"]].concat(), program);
+    assert_eq!((missing.status, &missing.json()["diagnostics"][0]["code"]), (2, &Value::from("tool-table")));
+}

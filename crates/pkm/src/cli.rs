@@ -89,6 +89,9 @@ pub(crate) struct ProgramArgs {
     /// Where the machine stands when the program begins, e.g. "X0 Y-260" (mm, degrees); default: its home pose
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pub start: Option<String>,
+    /// Tool table in LinuxCNC's format, lengths in mm
+    #[arg(long, value_name = "FILE")]
+    pub tool_table: Option<PathBuf>,
     /// Skip the lines that begin with `/`
     #[arg(long)]
     pub block_delete: bool,

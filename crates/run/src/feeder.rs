@@ -31,6 +31,9 @@ pub(crate) fn interpreter(machine: &Machine, options: &Options, start: &Pose) ->
         ..Settings::default()
     };
     let mut interpreter = Interpreter::new(settings);
+    if let Some(tools) = options.tools {
+        interpreter.tools_mut().clone_from(tools);
+    }
     interpreter.set_machine_position_mm(face(&start.to_array()));
     interpreter
 }

@@ -17,6 +17,7 @@ pub use summary::{ClosestApproach, JointSummary, SCHEMA, Summary};
 
 use feeder::{Feeder, FeederError};
 use pkm_canon::diagnostic::{Diagnostic, Severity};
+use pkm_gcode::ToolTable;
 use pkm_hal_sim::{JointConfig, Observer, Simulation, SimulationConfig, TickError};
 use pkm_kins::{Kinematics, Pose};
 use pkm_machine::Machine;
@@ -24,7 +25,7 @@ use std::ops::ControlFlow;
 use summary::Account;
 
 /// What a caller may set.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// Where the machine stands when the program begins (mm, rad); `None` = the machine's home.
     pub start: Option<Pose>,
@@ -36,11 +37,20 @@ pub struct Options {
     pub max_ticks: u64,
     /// `/` lines are skipped.
     pub block_delete: bool,
+    /// The tools of the machine; none without it. Read once for the life of the process.
+    pub tools: Option<&'static ToolTable>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { start: None, feed_override: 1.0, substeps: 1, max_ticks: 100_000_000, block_delete: false }
+        Self {
+            start: None,
+            feed_override: 1.0,
+            substeps: 1,
+            max_ticks: 100_000_000,
+            block_delete: false,
+            tools: None,
+        }
     }
 }
 

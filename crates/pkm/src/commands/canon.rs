@@ -1,28 +1,23 @@
 //! `pkm canon`: canonical commands as LinuxCNC's `rs274 -g` prints them.
 
 use crate::cli::{Canon, Dialect, OnError};
-use crate::commands::program;
+use crate::commands::{program, tool_table};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::render::diagnostics::Messages;
 use atomic_write_file::AtomicWriteFile;
-use pkm_canon::diagnostic::Severity;
 use pkm_canon::text::{Spelling, TextWriter};
 use pkm_gcode::{FileSource, LineSource, MemorySource, Place, Settings, SourceError, ToolTable, canon_text};
 use pkm_run::Program;
 use std::cell::Cell;
-use std::fs::File;
-use std::io::{self, BufWriter, Read, Write, stdout};
+use std::io::{self, BufWriter, Write, stdout};
 use std::path::{Path, PathBuf};
-
-/// The largest tool table that is read.
-const MOST_TABLE_BYTES: u64 = 1 << 20;
 
 pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Failure> {
     let program = program::open(&arguments.program)?;
     let name = program.name();
     let tools = match &arguments.tool_table {
-        Some(path) => tool_table(path, messages)?,
+        Some(path) => tool_table::read(path, messages)?,
         None => ToolTable::default(),
     };
     let mut source: Box<dyn LineSource> = match &program {
@@ -130,35 +125,4 @@ impl LineSource for Stoppable<'_> {
     fn find_subroutine(&mut self, name: &str) -> Result<Option<Place>, SourceError> {
         self.source.find_subroutine(name)
     }
-}
-
-/// A tool table; lines that are no tool are skipped with a warning.
-fn tool_table(path: &Path, messages: &Messages) -> Result<ToolTable, Failure> {
-    let name = path.display().to_string();
-    let refuse = |message: String, help| Failure::could_not("tool-table", &name, message, help);
-    let mut text = Vec::new();
-    File::open(path).and_then(|file| file.take(MOST_TABLE_BYTES + 1).read_to_end(&mut text)).map_err(
-        |error| refuse(format!("cannot read {name}: {error}"), "check the path and its permissions"),
-    )?;
-    if text.len() as u64 > MOST_TABLE_BYTES {
-        return Err(refuse(format!("larger than {MOST_TABLE_BYTES} bytes"), "give a tool table"));
-    }
-    let mut skipped = Vec::new();
-    let table = ToolTable::parse(&text, |line, _| skipped.push(line))
-        .map_err(|error| refuse(error.to_string(), "give a shorter table"))?;
-    let warnings: Vec<_> = skipped
-        .into_iter()
-        .map(|line| pkm_canon::diagnostic::Diagnostic {
-            code: "tool-table".into(),
-            severity: Severity::Warning,
-            message: "this line is no tool and is skipped".into(),
-            help: Some("write for example: T1 P1 D6 Z12.5 ;end mill".into()),
-            file: name.clone(),
-            line,
-            column: 1,
-            end_column: 1,
-        })
-        .collect();
-    messages.print(&warnings);
-    Ok(table)
 }

@@ -34,7 +34,7 @@ pub(crate) fn run(arguments: &Check, messages: &Messages) -> Result<Outcome, Fai
 }
 
 fn check(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
-    let job = Job::new(&arguments.program)?;
+    let job = Job::new(&arguments.program, messages)?;
     let checked = pkm_run::check(&job.program, &job.machine, &job.options)?;
     let mut out = stdout().lock();
     match arguments.program.format {

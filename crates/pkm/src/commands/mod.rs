@@ -7,3 +7,4 @@ pub(crate) mod kins;
 pub(crate) mod machines;
 pub(crate) mod program;
 pub(crate) mod run;
+pub(crate) mod tool_table;

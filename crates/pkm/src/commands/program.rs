@@ -1,8 +1,9 @@
 //! What `run` and `check` have in common: the program, the machine, the start pose.
 
 use crate::cli::ProgramArgs;
+use crate::commands::tool_table;
 use crate::outcome::Failure;
-use crate::render::diagnostics;
+use crate::render::diagnostics::{self, Messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_kins::{Axis, Kinematics, Pose, maths};
 use pkm_machine::Machine;
@@ -46,11 +47,16 @@ impl<'a> Refused<'a> {
 
 impl Job {
     /// Reads the machine, and a program that comes through a pipe.
-    pub(crate) fn new(arguments: &ProgramArgs) -> Result<Self, Failure> {
+    pub(crate) fn new(arguments: &ProgramArgs, messages: &Messages) -> Result<Self, Failure> {
         let machine = Machine::load(&arguments.machine.machine, &arguments.machine.set)?;
         let start = arguments.start.as_deref().map(|text| start(&machine, text)).transpose()?;
         let program = open(&arguments.program)?;
-        let options = Options { start, block_delete: arguments.block_delete, ..Options::default() };
+        let tools = match &arguments.tool_table {
+            // Read once; the job lasts as long as the process.
+            Some(path) => Some(&*Box::leak(Box::new(tool_table::read(path, messages)?))),
+            None => None,
+        };
+        let options = Options { start, block_delete: arguments.block_delete, tools, ..Options::default() };
         Ok(Self { program, machine, options })
     }
 }

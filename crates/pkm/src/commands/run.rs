@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &Run, messages: &Messages) -> Result<Outcome, Failu
 }
 
 fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
-    let Job { program, machine, options } = Job::new(&arguments.program)?;
+    let Job { program, machine, options } = Job::new(&arguments.program, messages)?;
     let options = Options {
         feed_override: arguments.feed_override / 100.0,
         substeps: arguments.trace_substeps,
