@@ -1,7 +1,8 @@
 //! Small components: any number of instances, one function each.
 
 use crate::component::{Component, Fault, Tick};
-use crate::hal::{Hal, HalError, Role};
+use crate::hal::{Hal, Role};
+use crate::hal_error::HalError;
 use crate::values::{BitPin, FloatPin, S32Pin, U32Pin, Values};
 
 /// A small component. One instance has its own pins and one function.

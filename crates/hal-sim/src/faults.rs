@@ -13,7 +13,7 @@
 //!
 //! A bit pin shows no edges inside periods while it has a fault: steps on it are lost.
 
-use crate::values::{PinType, Value};
+use crate::values::{PinType, Value, Values};
 use std::fmt;
 use std::str::FromStr;
 
@@ -124,25 +124,85 @@ impl fmt::Display for PinFault {
     }
 }
 
-/// A fault that the HAL watches.
+/// The faults of a HAL.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Faults(Vec<Injected>);
+
 #[derive(Debug, Clone)]
-pub(crate) struct Injected {
-    pub(crate) tick: u64,
-    pub(crate) end: u64,
-    pub(crate) kind: FaultKind,
-    pub(crate) pin_type: PinType,
+struct Injected {
+    tick: u64,
+    end: u64,
+    kind: FaultKind,
+    pin_type: PinType,
     /// Index of the pin among those of its type.
-    pub(crate) index: u32,
+    index: usize,
     /// Cell that the pin reads while the fault is there.
-    pub(crate) cell: u32,
+    cell: u32,
     /// Cell that it reads otherwise; known while the fault is there.
-    pub(crate) original: Option<u32>,
-    pub(crate) frozen: Value,
+    original: Option<u32>,
+    frozen: Value,
+}
+
+impl Faults {
+    /// Takes up a fault of a pin; `now` is the next period.
+    pub(crate) fn add(
+        &mut self,
+        fault: &PinFault,
+        pin_type: PinType,
+        index: u32,
+        now: u64,
+        values: &mut Values,
+    ) {
+        let index = index as usize;
+        let frozen = values.cell(pin_type, values.pin_cells(pin_type)[index]);
+        let cell = values.new_cell(frozen);
+        let tick = fault.tick.max(now);
+        let end = fault.ticks.map_or(u64::MAX, |ticks| tick.saturating_add(ticks));
+        let kind = fault.kind;
+        self.0.push(Injected { tick, end, kind, pin_type, index, cell, original: None, frozen });
+    }
+
+    /// Redirects pins whose faults begin with period `now`, and back those whose faults end. True if one is there.
+    pub(crate) fn begin_and_end(&mut self, now: u64, values: &mut Values) -> bool {
+        for n in 0..self.0.len() {
+            let fault = &mut self.0[n];
+            let (pin_type, index) = (fault.pin_type, fault.index);
+            let pin = values.pin_cells(pin_type)[index];
+            if now == fault.tick {
+                fault.original = Some(pin);
+                fault.frozen = values.cell(pin_type, pin);
+                values.pin_cells_mut(pin_type)[index] = fault.cell;
+            } else if now == fault.end
+                && let Some(original) = fault.original.take()
+            {
+                let cell = fault.cell;
+                if pin == cell {
+                    values.pin_cells_mut(pin_type)[index] = original;
+                } else if let Some(later) =
+                    self.0.iter_mut().find(|later| later.original == Some(cell) && later.pin_type == pin_type)
+                {
+                    // another fault began on the same pin meanwhile: it reads the signal itself from now on
+                    later.original = Some(original);
+                }
+            }
+        }
+        self.0.iter().any(|fault| fault.original.is_some())
+    }
+
+    /// Lets the faulty pins show what they make of their signals.
+    pub(crate) fn show(&self, values: &mut Values) {
+        for fault in &self.0 {
+            if let Some(original) = fault.original {
+                let value = values.cell(fault.pin_type, original);
+                values.set_cell(fault.cell, fault.apply(value));
+            }
+        }
+    }
 }
 
 impl Injected {
     /// What the component reads in place of `value`.
-    pub(crate) fn apply(&self, value: Value) -> Value {
+    fn apply(&self, value: Value) -> Value {
         let number = |bits: bool, float: f64, s32: i64, u32: i64| match value {
             Value::Bit(_) => Value::Bit(bits),
             Value::Float(_) => Value::Float(float),

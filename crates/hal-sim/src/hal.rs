@@ -8,11 +8,11 @@
 //! Units at the pins: mm and **degrees**, as in LinuxCNC.
 
 use crate::component::{Component, Fault, Setpoint, Tick};
-use crate::faults::{Injected, PinFault};
+use crate::faults::{Faults, PinFault};
+use crate::hal_error::HalError;
 use crate::values::{BitPin, FloatPin, PinType, S32Pin, U32Pin, Value, Values};
 use pkm_stepgen::{Period, TimingError};
 use std::collections::BTreeMap;
-use std::fmt;
 
 /// Longest name, in characters.
 pub const MAX_NAME: usize = 41;
@@ -30,73 +30,6 @@ pub enum Role {
     Parameter,
     /// A parameter that only the component writes.
     ReadOnly,
-}
-
-/// Why the HAL refuses. Names are as the caller gave them.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-#[allow(missing_docs)]
-pub enum HalError {
-    /// Longer than [`MAX_NAME`], empty, or with a character that names do not have.
-    BadName { name: String },
-    /// The name is taken.
-    Taken { name: String },
-    /// Nothing has this name; `what` says what was looked for.
-    Unknown { what: &'static str, name: String },
-    /// Two types that do not match.
-    WrongType { name: String, expected: PinType, found: PinType },
-    /// A second writer for a signal.
-    SecondWriter { signal: String, writer: String, pin: String },
-    /// The pin is linked to another signal.
-    Linked { pin: String, signal: String },
-    /// The value cannot be set from outside: an output, a read-only parameter, a signal with a writer.
-    NotSettable { name: String },
-    /// The value is NaN or infinite.
-    NotFinite { name: String },
-    /// A function is on a thread already.
-    FunctionInUse { function: String, thread: String },
-    /// Thread period 0, shorter than the first thread's or not a multiple of it.
-    ThreadPeriod { thread: String, period_ns: u64, base_period_ns: u64 },
-    /// A period and the timer do not go together.
-    Timing(TimingError),
-}
-
-impl fmt::Display for HalError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::BadName { name } => write!(
-                f,
-                "'{name}' is not a name: 1 to {MAX_NAME} characters of a-z, 0-9, '.', '-' (signals also A-Z, '_')"
-            ),
-            Self::Taken { name } => write!(f, "the name '{name}' is taken"),
-            Self::Unknown { what, name } => write!(f, "there is no {what} '{name}'"),
-            Self::WrongType { name, expected, found } => {
-                write!(f, "'{name}' is of type {expected}, not {found}")
-            }
-            Self::SecondWriter { signal, writer, pin } => {
-                write!(f, "signal '{signal}' is written by '{writer}' already; '{pin}' cannot write it too")
-            }
-            Self::Linked { pin, signal } => write!(f, "pin '{pin}' is linked to signal '{signal}' already"),
-            Self::NotSettable { name } => write!(f, "'{name}' cannot be set: something else writes it"),
-            Self::NotFinite { name } => write!(f, "'{name}' can only be set to a finite number"),
-            Self::FunctionInUse { function, thread } => {
-                write!(f, "function '{function}' is on thread '{thread}' already")
-            }
-            Self::ThreadPeriod { thread, period_ns, base_period_ns } => write!(
-                f,
-                "the period of thread '{thread}', {period_ns} ns, is not a multiple of the first thread's, {base_period_ns} ns"
-            ),
-            Self::Timing(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for HalError {}
-
-impl From<TimingError> for HalError {
-    fn from(error: TimingError) -> Self {
-        Self::Timing(error)
-    }
 }
 
 /// A pin or parameter as `show` lists it.
@@ -152,7 +85,7 @@ pub struct Hal {
     components: Vec<Box<dyn Component>>,
     threads: Vec<Thread>,
     base_ticks: u64,
-    faults: Vec<Injected>,
+    faults: Faults,
 }
 
 fn check_name(name: &str, signal: bool) -> Result<(), HalError> {
@@ -186,7 +119,7 @@ impl Hal {
             components: Vec::new(),
             threads: Vec::new(),
             base_ticks: 0,
-            faults: Vec::new(),
+            faults: Faults::default(),
         })
     }
 
@@ -425,7 +358,7 @@ impl Hal {
         if first || pin.role == Role::Out {
             self.values.set_cell(cell, self.values.cell(pin.pin_type, pin.own_cell));
         }
-        self.values.pin_cells(pin.pin_type)[pin.index as usize] = cell;
+        self.values.pin_cells_mut(pin.pin_type)[pin.index as usize] = cell;
         if let Some(record) = self.pins.get_mut(pin_name) {
             record.signal = Some(signal_name.to_owned());
         }
@@ -446,7 +379,7 @@ impl Hal {
         if let Some(signal) = pin.signal.take().and_then(|name| self.signals.get_mut(&name)) {
             signal.pins.retain(|name| name != pin_name);
             self.values.set_cell(own_cell, value);
-            self.values.pin_cells(pin_type)[index as usize] = own_cell;
+            self.values.pin_cells_mut(pin_type)[index as usize] = own_cell;
         }
         Ok(())
     }
@@ -614,8 +547,8 @@ impl Hal {
     /// The first [`Fault`] of a component. All functions have run nevertheless, and time has gone on: a component that
     /// refuses leaves its outputs as they were, and the emergency stop works as ever.
     pub fn run(&mut self, setpoint: Option<&Setpoint>) -> Result<(), Fault> {
-        let faulty = !self.faults.is_empty() && self.faults_begin_and_end();
         let Self { threads, components, values, base_ticks, faults, .. } = self;
+        let faulty = faults.begin_and_end(*base_ticks + 1, values);
         let mut result = Ok(());
         for thread in threads {
             if *base_ticks % thread.every != 0 {
@@ -625,7 +558,7 @@ impl Hal {
             let tick = Tick { number: thread.ticks, period: thread.period, setpoint };
             for &(component, function) in &thread.run {
                 if faulty {
-                    show_faults(faults, values);
+                    faults.show(values);
                 }
                 if let Err(fault) = components[component].run(function, values, &tick)
                     && result.is_ok()
@@ -649,62 +582,8 @@ impl Hal {
     pub fn inject(&mut self, fault: &PinFault) -> Result<(), HalError> {
         let pin = self.pins.get(&fault.pin).filter(|pin| matches!(pin.role, Role::In | Role::InOut));
         let pin = pin.ok_or_else(|| unknown("input pin", &fault.pin))?;
-        let (pin_type, index) = (pin.pin_type, pin.index);
-        let frozen = self.values.cell(pin_type, pin.own_cell);
-        let cell = self.values.new_cell(frozen);
-        let tick = fault.tick.max(self.base_ticks + 1);
-        let end = fault.ticks.map_or(u64::MAX, |ticks| tick.saturating_add(ticks));
-        self.faults.push(Injected {
-            tick,
-            end,
-            kind: fault.kind,
-            pin_type,
-            index,
-            cell,
-            original: None,
-            frozen,
-        });
+        self.faults.add(fault, pin.pin_type, pin.index, self.base_ticks + 1, &mut self.values);
         Ok(())
-    }
-
-    /// Redirects pins whose faults begin with this period, and back those whose faults end. True if one is there.
-    fn faults_begin_and_end(&mut self) -> bool {
-        let now = self.base_ticks + 1;
-        for n in 0..self.faults.len() {
-            let fault = &mut self.faults[n];
-            let (pin_type, index) = (fault.pin_type, fault.index as usize);
-            let pin = &mut self.values.pin_cells(pin_type)[index];
-            if now == fault.tick {
-                fault.original = Some(*pin);
-                *pin = fault.cell;
-                fault.frozen = self.values.cell(pin_type, fault.original.unwrap_or(fault.cell));
-            } else if now == fault.end
-                && let Some(original) = fault.original.take()
-            {
-                let cell = fault.cell;
-                if *pin == cell {
-                    *pin = original;
-                } else if let Some(later) = self
-                    .faults
-                    .iter_mut()
-                    .find(|later| later.original == Some(cell) && later.pin_type == pin_type)
-                {
-                    // another fault began on the same pin meanwhile: it reads the signal itself from now on
-                    later.original = Some(original);
-                }
-            }
-        }
-        self.faults.iter().any(|fault| fault.original.is_some())
-    }
-}
-
-/// Lets the faulty pins show what they make of their signals.
-fn show_faults(faults: &[Injected], values: &mut Values) {
-    for fault in faults {
-        if let Some(original) = fault.original {
-            let value = values.cell(fault.pin_type, original);
-            values.set_cell(fault.cell, fault.apply(value));
-        }
     }
 }
 

@@ -18,7 +18,8 @@
 //! `#` begins a comment, `\` at the end of a line joins the next, names of pins may be written in capitals (`pid.0.Pgain`).
 //! What is not known is an error with its line and column. INI values (`[SECTION]NAME`) and `source` are not supported.
 
-use crate::hal::{Hal, HalError, Role};
+use crate::hal::{Hal, Role};
+use crate::hal_error::HalError;
 use crate::modules::{self, LoadError};
 use crate::values::{PinType, Value};
 use std::fmt;

@@ -22,6 +22,7 @@ pub mod component;
 pub mod components;
 pub mod faults;
 pub mod hal;
+mod hal_error;
 pub mod hal_file;
 pub mod modules;
 pub mod simulation;
@@ -33,7 +34,8 @@ pub mod vcd;
 pub use component::{Component, Fault, PinIndex, PinName, Setpoint, SetpointSource, Tick};
 pub use components::driver::Violations;
 pub use faults::{FaultKind, FaultTextError, PinFault};
-pub use hal::{Hal, HalError, MAX_NAME, Role};
+pub use hal::{Hal, MAX_NAME, Role};
+pub use hal_error::HalError;
 pub use pkm_stepgen::{Edge, Line, PulseTimingNs};
 pub use simulation::{
     ConfigError, JointConfig, JointState, JointStatistics, Observer, Simulation, SimulationConfig, TickError,

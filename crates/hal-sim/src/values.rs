@@ -184,7 +184,17 @@ pub struct Values {
 
 impl Values {
     /// Where the pins of a type point.
-    pub(crate) fn pin_cells(&mut self, pin_type: PinType) -> &mut Vec<u32> {
+    pub(crate) const fn pin_cells(&self, pin_type: PinType) -> &Vec<u32> {
+        match pin_type {
+            PinType::Bit => &self.bits.pins,
+            PinType::Float => &self.floats.pins,
+            PinType::S32 => &self.s32s.pins,
+            PinType::U32 => &self.u32s.pins,
+        }
+    }
+
+    /// The same, to redirect one.
+    pub(crate) const fn pin_cells_mut(&mut self, pin_type: PinType) -> &mut Vec<u32> {
         match pin_type {
             PinType::Bit => &mut self.bits.pins,
             PinType::Float => &mut self.floats.pins,

@@ -13,7 +13,8 @@
 //! direction hold counts from the step's rising edge, as in the data sheets of A4988, DRV8825 and TMC2209.
 
 use crate::component::{Component, Fault, Tick};
-use crate::hal::{Hal, HalError, Role};
+use crate::hal::{Hal, Role};
+use crate::hal_error::HalError;
 use crate::values::{BitPin, S32Pin, U32Pin, Values};
 use pkm_stepgen::PulseTimingNs;
 

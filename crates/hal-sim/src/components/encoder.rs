@@ -13,7 +13,8 @@
 //! Functions: `encoder.update-counters` counts, `encoder.capture-position` shows. A leads B while counts grow.
 
 use crate::component::{Component, Fault, Tick};
-use crate::hal::{Hal, HalError, Role};
+use crate::hal::{Hal, Role};
+use crate::hal_error::HalError;
 use crate::values::{BitPin, FloatPin, S32Pin, Values};
 
 #[derive(Debug, Clone)]

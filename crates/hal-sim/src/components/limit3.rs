@@ -6,7 +6,7 @@
 
 use crate::block::{Block, BlockPins};
 use crate::component::Tick;
-use crate::hal::HalError;
+use crate::hal_error::HalError;
 use crate::values::{FloatPin, Values};
 use pkm_kins::maths::sqrt;
 

@@ -24,7 +24,8 @@
 //! been false and true again.
 
 use crate::component::{Component, Fault, PinIndex, PinName, Setpoint, Tick};
-use crate::hal::{Hal, HalError, Role};
+use crate::hal::{Hal, Role};
+use crate::hal_error::HalError;
 use crate::values::{BitPin, FloatPin, S32Pin, Values};
 use pkm_kins::{Axis, AxisSet, JointKind, JointRange, maths};
 

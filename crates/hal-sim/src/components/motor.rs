@@ -17,7 +17,8 @@
 //! steps from the field its torque turns round: it falls back by four full steps, one electrical cycle, and stands.
 
 use crate::component::{Component, Fault, PinIndex, PinName, Tick};
-use crate::hal::{Hal, HalError, Role};
+use crate::hal::{Hal, Role};
+use crate::hal_error::HalError;
 use crate::values::{FloatPin, S32Pin, U32Pin, Values};
 
 /// One motor as its place in the machine has it.

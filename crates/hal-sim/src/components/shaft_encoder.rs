@@ -15,7 +15,7 @@
 
 use crate::block::{Block, BlockPins};
 use crate::component::Tick;
-use crate::hal::HalError;
+use crate::hal_error::HalError;
 use crate::values::{BitPin, EdgeQueue, FloatPin, U32Pin, Values};
 use pkm_stepgen::Crossings;
 use pkm_stepgen::step_types::QUADRATURE;

@@ -5,7 +5,7 @@
 
 use crate::block::{Block, BlockPins};
 use crate::component::Tick;
-use crate::hal::HalError;
+use crate::hal_error::HalError;
 use crate::values::{BitPin, FloatPin, Values};
 use pkm_kins::maths::{TAU, cos, floor, sin};
 

@@ -19,7 +19,8 @@
 //! Unlike LinuxCNC's, whose position lags by 1.5 servo periods, this one reaches the command at the period's end.
 
 use crate::component::{Component, Fault, PinIndex, PinName, Tick};
-use crate::hal::{Hal, HalError, Role};
+use crate::hal::{Hal, Role};
+use crate::hal_error::HalError;
 use crate::values::{BitPin, EdgeQueue, FloatPin, LineEdge, S32Pin, U32Pin, Values};
 use pkm_stepgen::step_types::MAX_PHASES;
 use pkm_stepgen::{Edge, EdgeError, Line, PulseTimingNs, StepGenerator, StepType};
