@@ -12,6 +12,7 @@ use crate::faults::{Faults, PinFault};
 use crate::hal_error::HalError;
 use crate::values::{BitPin, FloatPin, PinType, S32Pin, U32Pin, Value, Values};
 use pkm_stepgen::{Period, TimingError};
+use std::any::Any;
 use std::collections::BTreeMap;
 
 /// Longest name, in characters.
@@ -539,6 +540,14 @@ impl Hal {
     /// A component by its place in order of loading.
     pub(crate) fn component(&self, index: usize) -> Option<&dyn Component> {
         self.components.get(index).map(AsRef::as_ref)
+    }
+
+    /// The first component of a type, e.g. the sampler, to take its rows.
+    pub fn component_mut<T: Component>(&mut self) -> Option<&mut T> {
+        self.components.iter_mut().find_map(|component| {
+            let component: &mut dyn Any = component.as_mut();
+            component.downcast_mut()
+        })
     }
 
     /// Runs one period of the first thread, and of each slower thread that is due; faster threads first.

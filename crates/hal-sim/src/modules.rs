@@ -6,6 +6,7 @@ use crate::components::stepgen::{Stepgen, StepgenChannel, StepgenError};
 use crate::components::*;
 use crate::hal::Hal;
 use crate::hal_error::HalError;
+use crate::values::PinType;
 use pkm_kins::{Axis, AxisSet, JointKind, JointRange, MAX_JOINTS};
 use pkm_stepgen::{PulseTimingNs, StepType};
 use std::fmt;
@@ -42,11 +43,12 @@ const BLOCKS: [(&str, Load); 22] = [
 ];
 
 /// Modules and their options, for `help` and for messages.
-pub const MODULES: [(&str, &str); 8] = [
+pub const MODULES: [(&str, &str); 9] = [
     ("threads", "name1= period1= (ns) [fp1=] ... name3= period3="),
     ("motmod", "servo_period_nsec= [base_period_nsec=] [num_joints=]"),
     ("stepgen", "step_type=0[,0...] [ctrl_type=p[,p...]]"),
     ("encoder", "[num_chan=]"),
+    ("sampler", "cfg=TYPES (b, f, s, u for each pin) depth=ROWS"),
     ("driver", "model=NAME[,NAME...] (simulated: A4988 DRV8825 TMC2209 DM542 TB6600)"),
     ("motor", "[num_chan=] (simulated)"),
     ("trivkins", "[coordinates=]"),
@@ -156,6 +158,7 @@ pub fn load(hal: &mut Hal, module: &str, options: &[&str]) -> Result<(), LoadErr
             Ok(motor::Motors::load(hal, &vec![channel; channel_count(&choices)?])?)
         }
         "driver" => driver(hal, &choices),
+        "sampler" => sampler(hal, &choices),
         "trivkins" => match choices.iter().find(|choice| choice.key != "coordinates") {
             Some(choice) => choice.unknown(),
             None => Ok(()), // joints are axes already
@@ -201,6 +204,31 @@ fn channel_count(choices: &[Choice<'_>]) -> Result<usize, LoadError> {
         }
     }
     Ok(count)
+}
+
+fn sampler(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {
+    let (mut types, mut depth) = (None, None);
+    for choice in choices {
+        match choice.key {
+            "cfg" => {
+                let pin_type = |letter: char| match letter.to_ascii_lowercase() {
+                    'b' => Some(PinType::Bit),
+                    'f' => Some(PinType::Float),
+                    's' => Some(PinType::S32),
+                    'u' => Some(PinType::U32),
+                    _ => None,
+                };
+                types = choice.value.chars().map(pin_type).collect::<Option<Vec<_>>>();
+                if types.as_ref().is_none_or(|types| types.is_empty() || types.len() > 20) {
+                    return choice.bad("1 to 20 letters of b, f, s, u");
+                }
+            }
+            "depth" => depth = Some(choice.number(1_000_000, "a number from 1 to 1000000")? as usize),
+            _ => return choice.unknown(),
+        }
+    }
+    let types = types.ok_or(LoadError::Missing("cfg"))?;
+    Ok(sampler::Sampler::load(hal, &types, depth.ok_or(LoadError::Missing("depth"))?)?)
 }
 
 fn driver(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {

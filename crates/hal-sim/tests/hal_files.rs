@@ -1,6 +1,7 @@
 //! HAL files as people write them, and what is wrong with others.
 
 use pkm_hal_sim::Value;
+use pkm_hal_sim::components::sampler::Sampler;
 use pkm_hal_sim::hal_file::Session;
 
 fn run(text: &str) -> (Session, String) {
@@ -286,4 +287,36 @@ fn any_bytes_end_in_an_answer() {
         let mut session = Session::new(100).unwrap();
         let _ = session.run_file(text, &mut String::new());
     }
+}
+
+#[test]
+fn the_sampler_keeps_rows_until_they_are_taken() {
+    let (mut session, _) = run("
+loadrt threads name1=t period1=1000000
+loadrt siggen
+loadrt sampler cfg=fB depth=5
+addf siggen.0.update t
+addf sampler.0 t
+net saw siggen.0.sawtooth => sampler.0.pin.0
+net clock siggen.0.clock => sampler.0.pin.1
+setp siggen.0.frequency 125
+");
+    ticks(&mut session, 3);
+    let take = |session: &mut Session| {
+        let sampler = session.hal_mut().component_mut::<Sampler>().unwrap();
+        let mut rows = String::new();
+        while let Some((tick, values)) = sampler.take() {
+            rows += &format!("{tick} {} {}\n", values[0], values[1]);
+        }
+        rows
+    };
+    assert_eq!(take(&mut session), "1 -1 TRUE\n2 -0.75 TRUE\n3 -0.5 TRUE\n");
+    ticks(&mut session, 7);
+    assert_eq!(session.hal().getp("sampler.0.overruns"), Ok(Value::S32(2)));
+    assert_eq!(session.hal().getp("sampler.0.full"), Ok(Value::Bit(true)));
+    assert_eq!(session.hal().getp("sampler.0.curr-depth"), Ok(Value::S32(5)));
+    assert_eq!(take(&mut session), "4 -0.25 TRUE\n5 0 FALSE\n6 0.25 FALSE\n7 0.5 FALSE\n8 0.75 FALSE\n");
+    session.hal_mut().setp("sampler.0.enable", Value::Bit(false)).unwrap();
+    ticks(&mut session, 3);
+    assert_eq!(take(&mut session), "");
 }

@@ -20,6 +20,7 @@ pub mod mux4;
 pub mod not;
 pub mod or2;
 pub mod pid;
+pub mod sampler;
 pub mod scale;
 pub mod shaft_encoder;
 pub mod shaft_switch;
