@@ -96,7 +96,8 @@ impl Block {
         self.settings.clear();
         self.comments.clear();
         self.motion = None;
-        (self.file, self.line, self.whole) = (line.file, line.number, line.whole());
+        (self.file, self.line) = (line.file, line.number);
+        self.whole = line.code_span(0, line.code().len());
     }
 
     pub(crate) fn has(&self, letter: u8) -> bool {

@@ -159,6 +159,7 @@ errors! {
     ONoMemory "o-memory" "o-words need an interpreter with memory (feature alloc)" "unroll the program";
     M98NoP "m98-no-p" "M98 without P" "P is the number of the program to call";
     EndlessLoop { blocks: u64 } "endless-loop" "{blocks} blocks without motion, dwell or input" "the loop does not end: check its condition, or raise the limit";
+    TooManyBlocks { limit: u64 } "too-many-blocks" "more than {limit} blocks executed" "raise the limit if the program is meant to run that long";
     // Feed, speed, spindle.
     FeedZero { code: Code } "feed-zero" "G{code} with feed 0" "set F first (G93, G94 and G95 make F unset)";
     FeedMissingG93 { code: Code } "feed-missing-g93" "G{code} without F in inverse time mode (G93)" "in G93 each move needs its own F";
@@ -214,6 +215,7 @@ errors! {
     ProbeShort { code: Code } "probe-short" "G{code} to where the tool stands" "give it a distance to search";
     // Tools and offsets.
     ToolUnknown { number: i32 } "tool-unknown" "tool {number} is not in the tool table" "add it to the tool table";
+    ToolNotSelected "tool-missing" "M6, but no tool was selected" "select it with T first; T0 for none";
     ToolMissing "tool-missing" "no tool table entry to change" "name a tool of the table with P";
     ToolTableFull { limit: u16 } "tool-table-full" "more than {limit} tools" "remove some";
     OffsetP { value: f64, first: i32, last: i32 } "offset-p" "G10 P{value}: P is a whole number from {first} to {last}" "name a coordinate system or a tool";

@@ -36,6 +36,8 @@ pub struct Settings {
     pub arc_radius_tolerance_mm: f64,
     /// The longest chain of blocks without motion, dwell or input before a loop counts as endless; 0 = no limit.
     pub max_idle_blocks: u64,
+    /// The most blocks one run may execute; 0 = no limit.
+    pub max_blocks: u64,
     /// Follow the oddities of the machine that `rs274` simulates: slot 1 counts as loaded at the start, and M61
     /// leaves the spindle's row of the tool table as it was.
     pub imitates_rs274: bool,
@@ -54,6 +56,7 @@ impl Default for Settings {
             arc_radius_tolerance_inch: 0.002_828_4,
             arc_radius_tolerance_mm: 0.028_284,
             max_idle_blocks: 10_000_000,
+            max_blocks: 0,
             imitates_rs274: false,
         }
     }

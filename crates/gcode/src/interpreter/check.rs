@@ -16,7 +16,7 @@ impl State {
     pub(crate) fn complete(&self, block: &mut Block) -> Result<(), Error> {
         block.motion = self.motion_of(block)?;
         check_g_codes(block, self)?;
-        check_m_codes(block)?;
+        check_m_codes(block, self.settings.dialect)?;
         self.check_words(block)
     }
 
@@ -51,7 +51,8 @@ impl State {
             if matches!(block.g(GGroup::ToolLength), Some(G43_1 | G43_2)) {
                 return Ok(None);
             }
-            if self.modal.motion == G80 {
+            // A spline needs its code in every block.
+            if matches!(self.modal.motion, G80 | G5 | G5_1) {
                 let letter = AXIS_LETTERS.iter().chain(b"@^").copied().find(|letter| block.has(*letter));
                 return Err(block.word_error(letter.unwrap_or(b'X'), ErrorKind::AxisWithoutMotion));
             }
@@ -81,6 +82,9 @@ impl State {
             && let Some(letter) = b"ABC".iter().copied().find(|letter| block.has(*letter))
         {
             return Err(block.word_error(letter, ErrorKind::CycleRotary { letter: letter.into() }));
+        }
+        if block.has(b'F') && matches!(motion, G33 | G33_1) {
+            return unused(b'F', "moves at feed");
         }
         if block.has(b'D')
             && !(compensation.is_some_and(|code| code != 400)
@@ -196,12 +200,14 @@ fn check_g_codes(block: &Block, state: &State) -> Result<(), Error> {
     Ok(())
 }
 
-fn check_m_codes(block: &Block) -> Result<(), Error> {
+fn check_m_codes(block: &Block, dialect: Dialect) -> Result<(), Error> {
     let fail = |kind| Err(block.m_error(MGroup::Io, kind));
     match block.m(MGroup::Io) {
         Some(number @ 62..=65) if !block.has(b'P') => fail(ErrorKind::IoMissing { number, letter: 'P' }),
         Some(number @ (67 | 68)) if !block.has(b'E') => fail(ErrorKind::IoMissing { number, letter: 'E' }),
-        Some(number @ (67 | 68)) if !block.has(b'Q') => fail(ErrorKind::IoMissing { number, letter: 'Q' }),
+        Some(number @ (67 | 68)) if !block.has(b'Q') && dialect == Dialect::Pkm => {
+            fail(ErrorKind::IoMissing { number, letter: 'Q' })
+        }
         _ => Ok(()),
     }
 }

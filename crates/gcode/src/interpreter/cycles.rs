@@ -329,14 +329,10 @@ fn tap(
 /// G87: bores from below: through the hole beside its axis, up to K, and back.
 fn back_bore(cycle: &Cycle, hole: &mut Hole<'_, '_>, direction: Direction) {
     let spindle = 0;
-    let Cycle { axes, r, bottom, clear, ijk: [i, j, k], .. } = *cycle;
-    let offset = [axes.first, axes.second].map(|axis| match axis % 3 {
-        0 => i,
-        1 => j,
-        _ => k,
-    });
-    let _ = offset;
-    let beside = [hole.at[0] + i, hole.at[1] + j];
+    let Cycle { axes, r, bottom, clear, ijk, .. } = *cycle;
+    let word = |letter: u8| ijk[usize::from(letter - b'I')];
+    let beside = [hole.at[0] + word(axes.first_centre), hole.at[1] + word(axes.second_centre)];
+    let top = word(axes.normal_centre);
     // The canon's own code of the direction: 2 clockwise, 3 counter-clockwise.
     let mode = if direction == Direction::Clockwise { 2 } else { 3 };
     hole.traverse_beside(beside, r);
@@ -345,7 +341,7 @@ fn back_bore(cycle: &Cycle, hole: &mut Hole<'_, '_>, direction: Direction) {
     hole.traverse_beside(beside, bottom);
     hole.traverse(bottom);
     hole.emit(Canon::StartSpindle { spindle, direction });
-    hole.feed(k);
+    hole.feed(top);
     hole.feed(bottom);
     hole.emit(Canon::StopSpindle { spindle });
     hole.emit(Canon::OrientSpindle { spindle, angle: 0.0, mode });

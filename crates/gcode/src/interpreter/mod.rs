@@ -76,6 +76,8 @@ pub struct Interpreter {
     begun: bool,
     /// Blocks since the last motion, dwell or input.
     idle_blocks: u64,
+    /// Blocks executed or passed over.
+    blocks: u64,
     #[cfg(feature = "alloc")]
     flow: flow::Flow,
 }
@@ -90,6 +92,7 @@ impl Interpreter {
             phase: Phase::New,
             begun: false,
             idle_blocks: 0,
+            blocks: 0,
             #[cfg(feature = "alloc")]
             flow: flow::Flow::default(),
         }
@@ -119,6 +122,12 @@ impl Interpreter {
     /// The line read last, trailing blanks cut: the source text for messages.
     pub fn source_line(&self) -> &[u8] {
         self.line.raw()
+    }
+
+    /// The text of a span's line if it is the line read last, else nothing: an error may point back, for example to
+    /// the call of a sub that was not found.
+    pub fn source_line_of(&self, span: Span) -> &[u8] {
+        if (span.file, span.line) == (self.line.file, self.line.number) { self.line.raw() } else { &[] }
     }
 
     /// Where the program believes the tool is: program coordinates, program units, degrees.
@@ -241,16 +250,20 @@ impl Interpreter {
         Error { kind, span: self.line.span(end, end) }
     }
 
-    /// A loop that does nothing for too long is taken for endless.
-    fn count_idle(&mut self) -> Result<(), Error> {
+    /// A loop that does nothing for too long is taken for endless; a run may have a limit.
+    fn count_block(&mut self) -> Result<(), Error> {
         self.idle_blocks += 1;
-        let limit = self.state.settings.max_idle_blocks;
-        if limit > 0 && self.idle_blocks > limit {
-            self.phase = Phase::Ended;
-            let kind = ErrorKind::EndlessLoop { blocks: limit };
-            return Err(Error { kind, span: self.line.whole() });
-        }
-        Ok(())
+        self.blocks += 1;
+        let Settings { max_idle_blocks, max_blocks, .. } = self.state.settings;
+        let kind = if max_idle_blocks > 0 && self.idle_blocks > max_idle_blocks {
+            ErrorKind::EndlessLoop { blocks: max_idle_blocks }
+        } else if max_blocks > 0 && self.blocks > max_blocks {
+            ErrorKind::TooManyBlocks { limit: max_blocks }
+        } else {
+            return Ok(());
+        };
+        self.phase = Phase::Ended;
+        Err(Error { kind, span: self.line.whole() })
     }
 
     fn execute_line(
@@ -276,7 +289,7 @@ impl Interpreter {
             _ => {}
         }
         self.line.prepare()?;
-        self.count_idle()?;
+        self.count_block()?;
         let start = self.line.skip_number()?;
         self.state.source_line = self.line.number;
         if self.line.code().get(start) == Some(&b'o') {

@@ -223,6 +223,8 @@ impl State {
         }
         let index = |letter: u8| match block.get(letter) {
             Some(value) if (0.0..1e6).contains(&value) => Ok(maths::round(value) as i32),
+            // LinuxCNC leaves the range to the machine.
+            Some(value) if self.settings.dialect != Dialect::Pkm => Ok(maths::round(value) as i32),
             value => {
                 let kind = ErrorKind::IoRange { number, letter: letter.into(), value: value.unwrap_or(-1.0) };
                 Err(block.word_error(letter, kind))
@@ -232,11 +234,11 @@ impl State {
             62 | 63 => out.emit(Canon::MotionOutputBit { index: index(b'P')?, on: number == 62 }),
             64 | 65 => out.emit(Canon::AuxOutputBit { index: index(b'P')?, on: number == 64 }),
             67 => {
-                let value = block.get(b'Q').unwrap_or(0.0);
+                let value = block.get(b'Q').unwrap_or(-1.0);
                 out.emit(Canon::MotionOutputValue { index: index(b'E')?, value });
             }
             68 => {
-                let value = block.get(b'Q').unwrap_or(0.0);
+                let value = block.get(b'Q').unwrap_or(-1.0);
                 out.emit(Canon::AuxOutputValue { index: index(b'E')?, value });
             }
             _ => {

@@ -61,8 +61,10 @@ impl State {
 
     fn set_system(&mut self, l: i32, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         let p = block.get(b'P').unwrap_or(-1.0);
-        let system = maths::round(p);
-        if (p - system).abs() > 0.0001 || !(0.0..=9.0).contains(&system) {
+        // LinuxCNC cuts the fraction off.
+        let strict = self.settings.dialect == Dialect::Pkm;
+        let system = if strict { maths::round(p) } else { maths::floor(p + 0.0001) };
+        if (strict && (p - system).abs() > 0.0001) || !(0.0..=9.0).contains(&system) {
             return Err(block.word_error(b'P', ErrorKind::OffsetP { value: p, first: 0, last: 9 }));
         }
         let system = if system == 0.0 { self.modal.system } else { system as i32 };

@@ -210,7 +210,8 @@ impl State {
                 (false, true) => "M50 P0",
             };
         }
-        if then.adaptive_feed != now.adaptive_feed {
+        // LinuxCNC forgets M52.
+        if then.adaptive_feed != now.adaptive_feed && self.settings.dialect == Dialect::Pkm {
             texts[4] = if then.adaptive_feed { "M52 P1" } else { "M52 P0" };
         }
         if then.feed_hold != now.feed_hold {

@@ -58,7 +58,7 @@ impl State {
         };
         let [i, j] = match (block.get(b'I'), block.get(b'J'), self.splines.tangent) {
             (Some(i), Some(j), _) => [i, j],
-            (None, None, Some([p, q])) if self.modal.motion == G5 => [-p, -q],
+            (None, None, Some([p, q])) => [-p, -q],
             _ => return words("I and J"),
         };
         let end = self.end_point(block)?;
@@ -102,7 +102,8 @@ impl State {
         if block.has(b'X') != block.has(b'Y') {
             return words("X and Y");
         }
-        if !self.splines.is_open() {
+        let begins = !self.splines.is_open();
+        if begins {
             let first_weight = if block.has(b'X') { None } else { weight };
             let [first, second, ..] = self.position;
             self.splines.order = 3;
@@ -112,7 +113,10 @@ impl State {
             self.splines.order = self.splines.order.max(l as u32);
         }
         if block.has(b'X') {
-            let weight = weight.unwrap_or(1.0);
+            let weight = match weight {
+                None if !begins => return words("P"),
+                weight => weight.unwrap_or(1.0),
+            };
             if weight <= 0.0 {
                 return Err(block.word_error(b'P', ErrorKind::NurbsWeight { value: weight }));
             }

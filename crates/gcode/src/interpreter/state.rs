@@ -213,6 +213,7 @@ impl State {
         match name {
             b"_vmajor" => Some(if self.settings.dialect == Dialect::LinuxCnc210 { 2.10 } else { 2.9 }),
             b"_vminor" => Some(0.0),
+            b"_metric_machine" if self.settings.imitates_rs274 => Some(-1.0), // it has no INI file
             b"_metric_machine" => flag((self.settings.machine_units_per_mm - 1.0).abs() < 1e-6),
             b"_line" => Some(self.source_line.into()),
             b"_motion_mode" => Some(modal.motion.into()),
@@ -259,7 +260,7 @@ impl State {
             b"_feed" => Some(modal.feed),
             b"_rpm" => Some(spindle.speed.abs()),
             b"_current_tool" => self.tools.get(0).map(|tool| tool.number.into()),
-            b"_current_pocket" => self.tools.get(0).map(|tool| tool.pocket.into()),
+            b"_current_pocket" => Some(self.loaded_slot.into()),
             b"_selected_tool" => Some(modal.selected_tool.into()),
             b"_selected_pocket" => Some(modal.selected_slot.into()),
             b"_task" | b"_remap_level" => Some(0.0),

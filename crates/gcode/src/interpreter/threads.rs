@@ -29,10 +29,6 @@ impl State {
     pub(crate) fn synchronized(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         let spindle = self.needs_turning_spindle(G33, block)?;
         let pitch = self.pitch_word(G33, block)?;
-        if block.has(b'F') {
-            let kind = ErrorKind::WordUnused { letter: 'F', users: "moves at feed" };
-            return Err(block.word_error(b'F', kind));
-        }
         let end = self.end_point(block)?;
         out.emit(Canon::StartSpeedFeedSync { spindle, feed_per_turn: pitch, velocity_mode: 0 });
         out.emit(Canon::StraightFeed(Position::from_array(end)));
@@ -46,10 +42,6 @@ impl State {
     pub(crate) fn rigid_tap(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         let spindle = self.needs_turning_spindle(G33_1, block)?;
         let pitch = self.pitch_word(G33_1, block)?;
-        if block.has(b'F') {
-            let kind = ErrorKind::WordUnused { letter: 'F', users: "moves at feed" };
-            return Err(block.word_error(b'F', kind));
-        }
         let end = self.end_point(block)?;
         let retract_scale = block.get(b'I').unwrap_or(1.0);
         if retract_scale < 1.0 {
@@ -98,25 +90,24 @@ impl State {
             taper_in: matches!(taper, 1 | 3),
             taper_out: matches!(taper, 2 | 3),
             taper_length: block.get(b'E').unwrap_or(0.0),
-            full_depth: i.abs() + k,
+            peak: i.abs(),
+            height: k,
             tangent: maths::tan(block.get(b'Q').unwrap_or(0.0) * maths::PI / 180.0),
             start: self.position,
-            end_x: end[0],
             end_z: end[2],
             inside: i > 0.0,
             spindle,
         };
-        // n-th pass at depth |I| + J n^(1/R) while above the full depth; then the full depth 1 + H times.
-        let mut pass = 1.0;
-        let mut depth = i.abs() + j;
-        while depth < thread.full_depth {
-            thread.pass(depth, i.abs(), self.modal.feed_override, out);
+        // n-th pass at depth J n^(1/R) below the peak while above the full depth; then 1 + H passes at full depth.
+        let (mut pass, mut depth) = (1.0, j);
+        while depth < k {
+            thread.pass(depth, self.modal.feed_override, out);
             pass += 1.0;
-            depth = i.abs() + j * maths::pow(pass, 1.0 / degression);
+            depth = j * maths::pow(pass, 1.0 / degression);
         }
         let spring = block.get(b'H').map_or(0, |h| h as i64).max(0);
         for _ in 0..=spring {
-            thread.pass(thread.full_depth, i.abs(), self.modal.feed_override, out);
+            thread.pass(k, self.modal.feed_override, out);
         }
         out.emit(Canon::StraightTraverse(Position::from_array(end)));
         self.modal.motion = G76;
@@ -125,16 +116,16 @@ impl State {
     }
 }
 
-/// One G76.
+/// One G76. Depths are measured below the thread's peak, which lies `peak` off the drive line (the start's X).
 struct Thread {
     pitch: f64,
     taper_in: bool,
     taper_out: bool,
     taper_length: f64,
-    full_depth: f64,
+    peak: f64,
+    height: f64,
     tangent: f64,
     start: [f64; 9],
-    end_x: f64,
     end_z: f64,
     /// An inside thread: the material is at larger X.
     inside: bool,
@@ -142,48 +133,48 @@ struct Thread {
 }
 
 impl Thread {
-    fn at(&self, depth: f64, z: f64) -> Position {
+    /// A point so far from the drive line towards the material.
+    fn at(&self, offset: f64, z: f64) -> Position {
         let mut point = self.start;
-        point[0] += if self.inside { depth } else { -depth };
+        point[0] += if self.inside { offset } else { -offset };
         point[2] = z;
         Position::from_array(point)
     }
 
-    /// One pass at a depth measured from the drive line.
-    fn pass(&self, depth: f64, peak: f64, override_was_on: bool, out: &mut Out<'_>) {
-        let _ = (self.end_x, peak);
+    fn pass(&self, depth: f64, override_was_on: bool, out: &mut Out<'_>) {
         let forward = if self.end_z > self.start[2] { 1.0 } else { -1.0 };
-        let z_start = self.start[2] - forward * (depth - peak) * self.tangent;
-        let z_end = self.end_z - forward * (depth - peak) * self.tangent;
-        let taper_pitch = |slope_depth: f64| {
-            if self.taper_length > 0.0 {
-                self.pitch * maths::hypot(self.taper_length, slope_depth) / self.taper_length
-            } else {
-                self.pitch
-            }
-        };
+        // Along the flank: the deeper, the further ahead.
+        let z_start = self.start[2] + forward * depth * self.tangent;
+        let z_end = self.end_z - forward * (self.height - depth) * self.tangent;
+        // The tool backs off a little further while the thread is shallow.
+        let back_off = depth - self.height;
+        let (cut, taper) = (self.peak + depth, self.peak + depth - self.height);
+        let taper_pitch = self.pitch * maths::hypot(self.taper_length, self.height) / self.taper_length;
         let spindle = self.spindle;
         let sync = |feed_per_turn| Canon::StartSpeedFeedSync { spindle, feed_per_turn, velocity_mode: 0 };
-        let entry = if self.taper_in { 0.0 } else { depth };
-        out.emit(Canon::StraightTraverse(self.at(0.0, z_start)));
-        out.emit(Canon::StraightTraverse(self.at(entry, z_start)));
+        let feed = |offset, z| Canon::StraightFeed(self.at(offset, z));
+        out.emit(Canon::StraightTraverse(self.at(back_off, z_start)));
+        if !self.taper_in {
+            out.emit(Canon::StraightTraverse(self.at(cut, z_start)));
+        }
         if override_was_on {
             out.emit(Canon::FeedOverride(false));
         }
         if self.taper_in {
-            out.emit(sync(taper_pitch(depth)));
-            out.emit(Canon::StraightFeed(self.at(depth, z_start + forward * self.taper_length)));
+            out.emit(sync(taper_pitch));
+            out.emit(feed(taper, z_start));
+            out.emit(feed(cut, z_start + forward * self.taper_length));
         }
         out.emit(sync(self.pitch));
         if self.taper_out {
-            out.emit(Canon::StraightFeed(self.at(depth, z_end - forward * self.taper_length)));
-            out.emit(sync(taper_pitch(depth)));
-            out.emit(Canon::StraightFeed(self.at(0.0, z_end)));
+            out.emit(feed(cut, z_end - forward * self.taper_length));
+            out.emit(sync(taper_pitch));
+            out.emit(feed(taper, z_end));
         } else {
-            out.emit(Canon::StraightFeed(self.at(depth, z_end)));
+            out.emit(feed(cut, z_end));
         }
         out.emit(Canon::StopSpeedFeedSync);
-        out.emit(Canon::StraightTraverse(self.at(0.0, z_end)));
+        out.emit(Canon::StraightTraverse(self.at(back_off, z_end)));
         if override_was_on {
             out.emit(Canon::FeedOverride(true));
         }

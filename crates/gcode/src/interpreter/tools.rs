@@ -32,8 +32,8 @@ impl State {
                 if self.modal.compensation.is_some() {
                     return Err(block.m_error(MGroup::Tool, ErrorKind::CcOn { what: "a tool change" }));
                 }
-                if self.modal.selected_slot < 0 {
-                    return Err(block.m_error(MGroup::Tool, ErrorKind::ToolMissing));
+                if self.modal.selected_slot < 0 && self.settings.dialect == Dialect::Pkm {
+                    return Err(block.m_error(MGroup::Tool, ErrorKind::ToolNotSelected));
                 }
                 if self.settings.dialect == Dialect::LinuxCnc29 {
                     out.emit(Canon::StartChange);
@@ -42,7 +42,7 @@ impl State {
                     self.modal.spindles[usize::from(spindle)].turning = None;
                     out.emit(Canon::StopSpindle { spindle: spindle.into() });
                 }
-                let (slot, tool) = (self.modal.selected_slot, self.modal.selected_tool);
+                let (slot, tool) = (self.modal.selected_slot.max(0), self.modal.selected_tool);
                 out.emit(Canon::ChangeTool { slot, tool });
                 self.tools.load_spindle(slot);
                 self.loaded_slot = slot;
