@@ -86,6 +86,8 @@ pub struct Stepgen {
 pub struct Path {
     /// Tolerance of G64 without P; 0 if absent.
     pub blend_tolerance_mm: Option<Number>,
+    /// Window of the moving average over every joint that limits jerk; 0 = none.
+    pub joint_smoothing_ms: Option<Number>,
 }
 
 /// `[singularity]`: bounds for the measures of [`pkm_kins::Singularity`], dimensionless.

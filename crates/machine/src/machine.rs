@@ -97,6 +97,8 @@ pub struct AxisLimits {
 pub struct PathSettings {
     /// Tolerance of G64 without P, mm; 0 = exact path.
     pub blend_tolerance: f64,
+    /// Window of the moving average over every joint that limits jerk, servo periods; 0 = none.
+    pub smoothing_periods: u32,
 }
 
 /// Bounds for the dimensionless measures of [`pkm_kins::Singularity`].
@@ -110,6 +112,8 @@ pub struct SingularityGuard {
 
 const SERVO_PERIOD_NS: RangeInclusive<i64> = 10_000..=100_000_000;
 const TIMER_PERIOD_NS: RangeInclusive<i64> = 1..=1_000_000;
+/// Longest average over the joints, servo periods.
+pub const MOST_SMOOTHING_PERIODS: u32 = 64;
 const DEFAULT_TIMER_PERIOD_NS: u64 = 100;
 const DEFAULT_GUARD: f64 = 0.001;
 const DEFAULT_WARN: f64 = 0.05;
@@ -160,7 +164,7 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
         let help = "change one of the two, so that every servo tick falls on the grid of the step edges";
         findings.error("machine-range", tables.servo.period_ns.span(), message, help);
     }
-    let path = path(tables, findings);
+    let path = path(tables, servo_period_ns.unwrap_or(1_000_000), findings);
     let singularity = singularity(tables, findings);
     let mechanism = file.kinematics.get_ref().build(file.kinematics.span(), findings);
     let joints =
@@ -185,12 +189,28 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
     })
 }
 
-fn path(tables: &file::Tables, findings: &mut Findings<'_>) -> Option<PathSettings> {
+fn path(tables: &file::Tables, servo_period_ns: u64, findings: &mut Findings<'_>) -> Option<PathSettings> {
     let blend_tolerance = match &tables.path.blend_tolerance_mm {
         Some(number) => not_negative("path.blend_tolerance_mm", number, findings)?,
         None => 0.0,
     };
-    Some(PathSettings { blend_tolerance })
+    let smoothing_periods = match &tables.path.joint_smoothing_ms {
+        Some(number) => {
+            let ms = not_negative("path.joint_smoothing_ms", number, findings)?;
+            let periods = maths::round(ms * 1e6 / servo_period_ns as f64);
+            if periods > f64::from(MOST_SMOOTHING_PERIODS) {
+                let most = f64::from(MOST_SMOOTHING_PERIODS) * servo_period_ns as f64 / 1e6;
+                let message = format!("path.joint_smoothing_ms = {ms} is longer than {most} ms");
+                let help =
+                    "a longer average moves the tool far off its path; lower the accelerations instead";
+                findings.error("machine-range", number.span(), message, help);
+                return None;
+            }
+            periods as u32
+        }
+        None => 0,
+    };
+    Some(PathSettings { blend_tolerance, smoothing_periods })
 }
 
 fn singularity(tables: &file::Tables, findings: &mut Findings<'_>) -> Option<SingularityGuard> {

@@ -43,6 +43,8 @@ pub(crate) enum Command {
     Run(Run),
     /// Everything that can be said before cutting, without producing pulses
     Check(Check),
+    /// How long every block takes and what limits it: feed, which joint, corners
+    Plan(Plan),
     /// Interpret without a machine and print canonical commands in LinuxCNC's text format
     Canon(Canon),
     /// Pose to joints and back, JSON lines in and out
@@ -63,6 +65,7 @@ impl Command {
             }
             Self::Run(arguments) => &arguments.program.machine.set,
             Self::Check(arguments) => &arguments.program.machine.set,
+            Self::Plan(arguments) => &arguments.program.machine.set,
             Self::Canon(_) | Self::Machines(_) | Self::Generate(_) => &[],
         }
     }
@@ -133,6 +136,15 @@ fn percent(text: &str) -> Result<f64, String> {
 pub(crate) struct Check {
     #[command(flatten)]
     pub program: ProgramArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Plan {
+    #[command(flatten)]
+    pub program: ProgramArgs,
+    /// How many of the longest blocks the text lists
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub longest: usize,
 }
 
 #[derive(Debug, Args)]

@@ -16,6 +16,7 @@ fn main() -> ExitCode {
     let result = match &cli.command {
         cli::Command::Run(arguments) => commands::run::run(arguments, &messages),
         cli::Command::Check(arguments) => commands::check::run(arguments, &messages),
+        cli::Command::Plan(arguments) => commands::plan::run(arguments, &messages),
         cli::Command::Canon(arguments) => commands::canon::run(arguments, &messages),
         cli::Command::Kins(command) => commands::kins::run(command),
         cli::Command::Machines(arguments) => commands::machines::run(arguments),

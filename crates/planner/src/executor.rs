@@ -36,6 +36,8 @@ pub(crate) struct Executor {
     /// Nothing moves until the next servo period: the machine came to a stop, or dwells.
     waits: bool,
     dwells: bool,
+    /// Servo periods still to rest at a stop.
+    settle: u32,
     hold: bool,
     abort: bool,
     feed_override: f64,
@@ -52,6 +54,7 @@ impl Executor {
             substep: 0,
             waits: false,
             dwells: false,
+            settle: 0,
             hold: false,
             abort: false,
             feed_override: 1.0,
@@ -61,6 +64,10 @@ impl Executor {
 
     pub(crate) fn at_rest(&self) -> bool {
         self.x == 0.0
+    }
+
+    pub(crate) fn has_settled(&self) -> bool {
+        self.x == 0.0 && self.settle == 0
     }
 
     pub(crate) fn rest(&mut self) {
@@ -132,7 +139,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let substeps = self.settings.substeps.max(1);
         self.executor.substep = (self.executor.substep + 1) % substeps;
         if !self.executor.waits {
+            let moved = !self.executor.at_rest();
             self.executor.waits = self.advance(self.settings.servo_period_s / f64::from(substeps), held);
+            if moved && self.executor.at_rest() {
+                self.executor.settle = self.settings.settle_periods;
+            }
         }
         let mut state = if self.executor.dwells { State::Dwell } else { State::Moving };
         if self.executor.at_rest() {
@@ -161,8 +172,12 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             }
             _ => false,
         };
+        let settles = self.executor.settle > 0 && !held;
+        if settles {
+            self.executor.settle -= 1;
+        }
         self.executor.dwells = dwells;
-        self.executor.waits = dwells;
+        self.executor.waits = dwells || settles;
     }
 
     /// The open end of the last move is released when the machine would have to brake for want of it.
@@ -344,6 +359,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             motion: piece.motion,
             s,
             blending: piece.corner,
+            feed_use: piece.feed.share(&point.first, speed),
             span: piece.span,
             state,
         };

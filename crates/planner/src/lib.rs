@@ -9,15 +9,21 @@
 //! so the machine can stop on the path at any time and a starved queue ends at rest at the end of what is known.
 #![no_std]
 
+#[cfg(test)]
+#[macro_use]
+extern crate std;
+
 mod executor;
 mod frame;
 mod grid;
 mod interval;
+mod jerk;
 mod limits;
 pub mod path;
 mod planner;
 
 pub use frame::{Event, Frame};
+pub use jerk::Smoother;
 pub use limits::{AxisLimits, Feed, GUARD, JointLimits, Limits, LimitsError};
 pub use planner::{Move, PathMode, Planner, PushError, Setpoint, Settings, State};
 

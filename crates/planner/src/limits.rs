@@ -260,6 +260,11 @@ pub struct Feed {
 }
 
 impl Feed {
+    /// Speed along the path at ṡ = `speed`, as a share of what was asked for.
+    pub(crate) fn share(&self, first: &[f64; 9], speed: f64) -> f64 {
+        if self.speed > 0.0 { feed_length(first, self.group) * speed / self.speed } else { 0.0 }
+    }
+
     fn cap(&self, first: &[f64; 9]) -> f64 {
         let length = feed_length(first, self.group);
         if length > 0.0 { (self.speed / length) * (self.speed / length) } else { f64::INFINITY }

@@ -45,6 +45,8 @@ pub struct Settings {
     pub servo_period_s: f64,
     /// Setpoints per servo period, evenly spaced: 1 in a controller, more to look between the ticks.
     pub substeps: u32,
+    /// Servo periods the machine rests at every stop, for a [`crate::Smoother`] behind the planner to arrive.
+    pub settle_periods: u32,
 }
 
 /// Why a move was not taken.
@@ -81,6 +83,8 @@ pub struct Setpoint {
     pub s: f64,
     /// On the blend after that move; `s` then runs along the blend.
     pub blending: bool,
+    /// The feed got, as a share of the feed asked for (before overrides); 0 on rapids.
+    pub feed_use: f64,
     /// The block.
     pub span: Span,
     /// Moving, held, ...
@@ -167,6 +171,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 motion: 0,
                 s: 0.0,
                 blending: false,
+                feed_use: 0.0,
                 span: Span::default(),
                 state: State::Idle,
             },
@@ -342,7 +347,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let gridded = self.grid.piece + 1 >= self.first_piece + self.pieces.len() as u64;
         let at_end = self.pieces.back().is_none_or(|last| !last.open && (gridded && self.grid.s >= last.to));
         let dwelling = self.nodes.front().is_some_and(|node| node.dwell_ns > 0);
-        at_end && self.nodes.len() <= 1 && self.executor.at_rest() && !dwelling
+        at_end && self.nodes.len() <= 1 && self.executor.has_settled() && !dwelling
     }
 
     /// Empties the queue; the machine must be at rest. The queue then ends where the machine is.

@@ -13,12 +13,15 @@ use pkm_kins::machine::Mechanism;
 use pkm_kins::{Kinematics, Pose, maths};
 use pkm_machine::Machine;
 use pkm_planner::path::{Tolerance, Vector, feed_length};
-use pkm_planner::{AxisLimits, Event, Frame, JointLimits, Limits, Planner, PushError, State};
+use pkm_planner::{AxisLimits, Event, Frame, JointLimits, Limits, Planner, PushError, Smoother, State};
 use std::collections::VecDeque;
 use std::fmt;
 
 /// Joints and limited axes of any machine here; pieces and nodes for a look-ahead of thousands of short blocks.
 type HostPlanner = Planner<Mechanism, 12, 2048, 2048>;
+
+/// Setpoints a smoother can average: its longest window with ten rows between the servo ticks.
+const SMOOTHER: usize = 640;
 
 /// Tolerance of a blend in rotary coordinates, rad (0.01°): G64 P speaks of lengths.
 const BLEND_RAD: f64 = 0.01 / 180.0 * maths::PI;
@@ -83,6 +86,11 @@ pub(crate) struct Feeder<'a> {
     source: Box<dyn LineSource + 'a>,
     frame: Frame,
     planner: Box<HostPlanner>,
+    smoother: Option<Box<Smoother<SMOOTHER>>>,
+    /// Setpoints not yet reached by the average, oldest first: it is half a window late.
+    late: VecDeque<pkm_planner::Setpoint>,
+    delay: usize,
+    setpoint: pkm_planner::Setpoint,
     queue: VecDeque<(Event, Span)>,
     start: Pose,
     program_ended: bool,
@@ -124,12 +132,16 @@ impl<'a> Feeder<'a> {
         let settings = pkm_planner::Settings {
             servo_period_s: machine.servo_period_ns as f64 / 1e9,
             substeps: options.substeps.max(1),
+            settle_periods: machine.path.smoothing_periods,
         };
         let mut planner = Box::new(
             HostPlanner::new(machine.mechanism, limits, settings, start)
                 .map_err(|e| messages::plan(program, machine, &e))?,
         );
         planner.set_feed_override(options.feed_override);
+        let window = machine.path.smoothing_periods as usize * options.substeps.max(1) as usize;
+        let setpoint = *planner.setpoint();
+        let smoother = (window > 1).then(|| Box::new(Smoother::new(window, setpoint.joints)));
         let source = program.open().map_err(|e| messages::unreadable(program, &e))?;
         Ok(Self {
             program,
@@ -138,6 +150,10 @@ impl<'a> Feeder<'a> {
             source,
             frame: frame(machine, &start),
             planner,
+            smoother,
+            late: VecDeque::new(),
+            delay: window / 2,
+            setpoint,
             queue: VecDeque::new(),
             start,
             program_ended: false,
@@ -167,8 +183,9 @@ impl<'a> Feeder<'a> {
         self.planner.setpoint().span.line
     }
 
+    /// The setpoint given last.
     pub(crate) fn setpoint(&self) -> &pkm_planner::Setpoint {
-        self.planner.setpoint()
+        &self.setpoint
     }
 
     /// Interprets as far ahead as the planner has room.
@@ -240,7 +257,7 @@ impl SetpointSource for Feeder<'_> {
 
     fn next(&mut self, _tick: u64) -> Result<Setpoint, FeederError> {
         self.fill();
-        let setpoint = self
+        let mut setpoint = self
             .planner
             .tick()
             .map_err(|e| FeederError(Box::new(messages::plan(self.program, self.machine, &e))))?;
@@ -248,6 +265,20 @@ impl SetpointSource for Feeder<'_> {
             let failure = messages::plan(self.program, self.machine, &fault);
             self.fail(failure);
         }
+        if let Some(smoother) = &mut self.smoother {
+            let (joints, joint_velocity) = smoother.push(&setpoint.joints, &setpoint.joint_velocity);
+            // Near a singularity the averaged joints may have no pose; the planned one is shown then.
+            let pose = self.machine.mechanism.forward(&joints, &self.setpoint.pose).unwrap_or(setpoint.pose);
+            self.late.push_back(setpoint);
+            // The place on the path is that of the setpoint in the middle of the window.
+            let middle = match self.late.len() {
+                n if n > self.delay => self.late.pop_front().unwrap_or(setpoint),
+                _ => self.late.front().copied().unwrap_or(setpoint),
+            };
+            setpoint =
+                pkm_planner::Setpoint { joints, joint_velocity, pose, state: setpoint.state, ..middle };
+        }
+        self.setpoint = setpoint;
         Ok(Setpoint {
             pose: setpoint.pose,
             joints: setpoint.joints,

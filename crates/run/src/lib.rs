@@ -8,10 +8,12 @@ mod check;
 mod deviation;
 mod feeder;
 mod messages;
+mod plan;
 mod program;
 mod summary;
 
 pub use check::{Checked, check};
+pub use plan::{BlockPlan, Plan, Shares, plan};
 pub use program::Program;
 pub use summary::{ClosestApproach, JointSummary, SCHEMA, Summary};
 

@@ -58,7 +58,7 @@ pub(crate) fn drive(case: &Case, period_s: f64, disturbance: Disturbance, one_pe
         .collect();
     let start = Pose::from_array(case.moves[0].0.at(0.0).position);
     let limits = Limits::new(&joint_limits, &[], 0.0).unwrap();
-    let settings = Settings { servo_period_s: period_s, substeps: 1 };
+    let settings = Settings { servo_period_s: period_s, substeps: 1, settle_periods: 0 };
     let mut planner = TestPlanner::new(case.mechanism, limits, settings, start).unwrap();
     let n = case.mechanism.joint_count();
     let mut rows = vec![planner.setpoint().joints; 3];

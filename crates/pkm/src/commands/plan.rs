@@ -1,0 +1,61 @@
+//! `pkm plan`: how long every block takes and what limits it.
+
+use crate::cli::{Format, Plan};
+use crate::commands::program::{Job, Refused};
+use crate::outcome::{Failure, Outcome};
+use crate::render::diagnostics::{Json, Messages};
+use serde::Serialize;
+use std::io::{Write, stdout};
+
+/// The plan as scripts read it.
+#[derive(Serialize)]
+struct Answer<'a> {
+    #[serde(flatten)]
+    plan: &'a pkm_run::Plan,
+    diagnostics: Vec<Json<'a>>,
+}
+
+pub(crate) fn run(arguments: &Plan, messages: &Messages) -> Result<Outcome, Failure> {
+    match (plan(arguments, messages), arguments.program.format) {
+        (Err(Failure::CouldNot(diagnostics)), Format::Json) => {
+            let refused = Refused::new(&arguments.program, &diagnostics);
+            writeln!(stdout().lock(), "{}", serde_json::to_string(&refused).map_err(std::io::Error::from)?)?;
+            Ok(Outcome::CouldNot)
+        }
+        (answer, _) => answer,
+    }
+}
+
+fn plan(arguments: &Plan, messages: &Messages) -> Result<Outcome, Failure> {
+    let job = Job::new(&arguments.program, messages)?;
+    let plan = pkm_run::plan(&job.program, &job.machine, &job.options)?;
+    let mut out = stdout().lock();
+    match arguments.program.format {
+        Format::Json => {
+            let answer =
+                Answer { plan: &plan, diagnostics: plan.diagnostics.iter().map(Json::from).collect() };
+            writeln!(out, "{}", serde_json::to_string(&answer).map_err(std::io::Error::from)?)?;
+        }
+        Format::Text => {
+            messages.print(&plan.diagnostics);
+            writeln!(
+                out,
+                "{} on {}: {:.3} s; {}",
+                plan.program, plan.machine, plan.duration_s, plan.verdict
+            )?;
+            let total: f64 = plan.limited_by_s.values().sum();
+            let mut shares: Vec<(&String, &f64)> = plan.limited_by_s.iter().collect();
+            shares.sort_by(|a, b| b.1.total_cmp(a.1));
+            for (limit, seconds) in shares {
+                writeln!(out, "  {:5.1} %  {seconds:9.3} s  {limit}", 100.0 * seconds / total)?;
+            }
+            let mut blocks: Vec<&pkm_run::BlockPlan> = plan.blocks.iter().collect();
+            blocks.sort_by(|a, b| b.duration_s.total_cmp(&a.duration_s));
+            writeln!(out, "  the longest blocks:")?;
+            for block in blocks.iter().take(arguments.longest) {
+                writeln!(out, "  line {:6}  {:9.3} s", block.line, block.duration_s)?;
+            }
+        }
+    }
+    Ok(if plan.completed { Outcome::Clean } else { Outcome::No })
+}
