@@ -20,7 +20,7 @@ impl Observer for Path {
     }
     fn edge(&mut self, _: &Edge) {}
     fn tick(&mut self, report: &TickReport<'_>) {
-        if report.tick % 60 == 0 {
+        if report.tick.is_multiple_of(60) {
             self.0.push(report.setpoint.pose);
         }
     }
