@@ -19,12 +19,14 @@ mod grid;
 mod interval;
 mod jerk;
 mod limits;
+mod merge;
 pub mod path;
 mod planner;
 
 pub use frame::{Event, Frame};
 pub use jerk::Smoother;
 pub use limits::{AxisLimits, Feed, GUARD, JointLimits, Limits, LimitsError};
+pub use merge::{Chords, MOST_MERGED, Merger};
 pub use planner::{Move, PathMode, Planner, PushError, Setpoint, Settings, State};
 
 use pkm_canon::Span;
