@@ -1,6 +1,6 @@
 //! Circular arc, helix and spiral in any plane of XYZ; the other coordinates go linearly with the angle.
 
-use super::{Point, Vector, norm3};
+use super::{Point, Vector};
 use pkm_kins::maths::{TAU, atan2, cos, sin, sqrt};
 
 /// An arc about `base`: XYZ(s) = base + r(s) (u cos θ + v sin θ) + rate s, with θ = ω s and r = r₀ + ρ s.
@@ -107,16 +107,6 @@ impl Arc {
         }
         point
     }
-
-    /// Largest radius on the arc, mm.
-    pub fn max_radius_mm(&self) -> f64 {
-        self.radius_mm.max(self.radius_mm + self.radius_rate * self.length)
-    }
-
-    /// Speed of XYZ per s at the start (1 for circles and helices).
-    pub fn scale(&self) -> f64 {
-        norm3(&self.at(0.0).first, 0)
-    }
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -133,6 +123,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::norm3;
     use super::*;
 
     #[test]
@@ -145,7 +136,7 @@ mod tests {
         for (got, want) in at_end.iter().zip(end) {
             assert!((got - want).abs() < 1e-12, "{at_end:?}");
         }
-        assert!((quarter.scale() - 1.0).abs() < 1e-12);
+        assert!((norm3(&quarter.at(1.0).first, 0) - 1.0).abs() < 1e-12);
         end = start;
         let double = Arc::new(start, end, [0.0; 3], n, -2).unwrap();
         assert!((double.length - 40.0 * core::f64::consts::PI).abs() < 1e-9);
