@@ -85,6 +85,9 @@ impl State {
         };
         let turns = if code == G2 { -turns } else { turns };
         self.check_feed(code, block)?;
+        if self.cutter.arc_refused {
+            return Err(block.motion_error(ErrorKind::CcArcAfter));
+        }
 
         let end = self.end_point(block)?;
         let from = [self.position[axes.first], self.position[axes.second]];
@@ -96,6 +99,9 @@ impl State {
         self.modal.motion = code;
         let rise = end[axes.normal] - self.position[axes.normal];
         self.inverse_time_rate(block, helix_length(from, to, centre, turns, rise), out);
+        if let Some(side) = self.compensates() {
+            return self.arc_compensated(side, end, centre, turns, block, out);
+        }
         self.position = end;
         out.emit(Canon::ArcFeed {
             end: Position::from_array(end),

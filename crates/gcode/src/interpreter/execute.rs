@@ -48,6 +48,7 @@ impl State {
             synch |= self.motion(block, out)?;
         }
         if let Some(number) = block.m(MGroup::Stop) {
+            self.finish_compensation(block, out)?;
             return Ok(if self.stop(number, out) {
                 Status::Ended
             } else if synch {

@@ -12,7 +12,7 @@ use crate::parameters::ARGUMENTS;
 use crate::settings::Dialect;
 use crate::source::{LineSource, Place, SourceError};
 use alloc::{boxed::Box, collections::BTreeMap, vec::Vec};
-use pkm_canon::Span;
+use pkm_canon::{CanonSink, Span};
 use pkm_kins::maths;
 
 /// Deepest nesting of calls (LinuxCNC: ten levels with the main program).
@@ -473,7 +473,7 @@ impl Interpreter {
     }
 
     /// M99: returns from a Fanuc program. False at the main level, where it ends the program.
-    fn fanuc_return(&mut self, source: &mut dyn LineSource, out: &mut Out<'_>) -> Result<bool, Error> {
+    fn fanuc_return(&mut self, source: &mut dyn LineSource, sink: &mut dyn CanonSink) -> Result<bool, Error> {
         let span = self.block.m_span(crate::modal::MGroup::Stop);
         let Some(frame) = self.flow.frames.last_mut() else { return Ok(false) };
         if frame.style == Style::OWord {
@@ -485,7 +485,7 @@ impl Interpreter {
             self.seek(source, body)?;
         } else {
             if let Some(saved) = self.leave(source)? {
-                self.state.restore(&saved, span, out)?;
+                self.state.restore(&saved, span, &mut Out { sink, span, queue: &mut self.queue })?;
             }
         }
         Ok(true)
@@ -622,13 +622,13 @@ impl Interpreter {
     pub(super) fn program_call(
         &mut self,
         source: &mut dyn LineSource,
-        out: &mut Out<'_>,
+        sink: &mut dyn CanonSink,
     ) -> Result<Option<Status>, Error> {
         if self.block.has_m(98) {
             self.fanuc_call(source)?;
             return Ok(Some(Status::Running));
         }
-        if self.block.has_m(99) && self.flow.depth() > 0 && self.fanuc_return(source, out)? {
+        if self.block.has_m(99) && self.flow.depth() > 0 && self.fanuc_return(source, sink)? {
             return Ok(Some(Status::Running));
         }
         Ok(None)

@@ -3,6 +3,7 @@
 mod arcs;
 mod check;
 mod comments;
+mod compensation;
 mod cycles;
 mod end;
 mod execute;
@@ -12,6 +13,7 @@ mod modes;
 mod motion;
 mod offsets;
 mod probing;
+mod queue;
 mod saved;
 mod splines;
 mod state;
@@ -26,6 +28,7 @@ use crate::settings::{Dialect, Settings};
 use crate::source::{LineSource, Place};
 use crate::tool_table::ToolTable;
 use pkm_canon::{Canon, CanonSink, Position, Span};
+use queue::Queue;
 use state::State;
 
 /// What a step left behind.
@@ -45,11 +48,26 @@ pub enum Status {
 pub(crate) struct Out<'a> {
     sink: &'a mut dyn CanonSink,
     span: Span,
+    /// What waits for the end of a compensated move.
+    queue: &'a mut Queue,
 }
 
 impl Out<'_> {
+    /// Emits a command, or lets it wait behind a compensated move.
     pub(crate) fn emit(&mut self, command: Canon<'_>) {
-        self.sink.command(&command, self.span);
+        if !self.queue.take(&command, self.span) {
+            self.sink.command(&command, self.span);
+        }
+    }
+
+    /// The interpreter's own remarks, as LinuxCNC words them.
+    pub(crate) fn remark(&mut self, text: &str) {
+        self.emit(Canon::Comment(text.into()));
+    }
+
+    /// Everything that waits goes out.
+    pub(crate) fn flush(&mut self) {
+        self.queue.flush(self.sink);
     }
 }
 
@@ -73,6 +91,7 @@ pub struct Interpreter {
     line: Line,
     block: Block,
     phase: Phase,
+    queue: Queue,
     begun: bool,
     /// Blocks since the last motion, dwell or input.
     idle_blocks: u64,
@@ -90,6 +109,7 @@ impl Interpreter {
             line: Line::new(),
             block: Block::new(),
             phase: Phase::New,
+            queue: Queue::default(),
             begun: false,
             idle_blocks: 0,
             blocks: 0,
@@ -178,7 +198,7 @@ impl Interpreter {
         self.phase = Phase::Opening;
         self.state.take_over_parameters();
         let state = &self.state;
-        let mut out = Out { sink, span: Span::default() };
+        let mut out = Out { sink, span: Span::default(), queue: &mut self.queue };
         out.emit(Canon::UseLengthUnits(state.modal.units));
         out.emit(state.g5x_command());
         out.emit(state.g92_command());
@@ -206,7 +226,7 @@ impl Interpreter {
                 let loaded = self.line.load(text, place.file, number);
                 let mut frame_begins = false;
                 if self.phase == Phase::Opening && !self.line.raw().is_empty() {
-                    Out { sink: &mut *sink, span: Span::default() }.emit(Canon::OnReset);
+                    sink.command(&Canon::OnReset, Span::default());
                     self.begun = true;
                     frame_begins = self.line.raw().trim_ascii() == b"%";
                     self.phase = Phase::Running { framed: frame_begins };
@@ -278,7 +298,7 @@ impl Interpreter {
             [] => return Ok(Status::Running),
             b"%" if framed => {
                 self.phase = Phase::Ended;
-                Out { sink, span: self.line.whole() }.emit(Canon::Finish);
+                sink.command(&Canon::Finish, self.line.whole());
                 #[cfg(feature = "alloc")]
                 if let Some(error) = self.flow.unclosed() {
                     return Err(error);
@@ -303,12 +323,17 @@ impl Interpreter {
         if self.block.motion.is_some() || self.block.has_pause() {
             self.idle_blocks = 0;
         }
-        let mut out = Out { sink, span: self.block.span() };
         self.state.store_settings(&self.block, &self.line)?;
-        if let Some(status) = self.program_call(source, &mut out)? {
+        if let Some(status) = self.program_call(source, sink)? {
             return Ok(status);
         }
+        let mut out = Out { sink, span: self.block.span(), queue: &mut self.queue };
         let status = self.state.execute(&mut self.block, &self.line, &mut out)?;
+        if out.queue.overflow {
+            self.phase = Phase::Ended;
+            let kind = ErrorKind::QueueFull { limit: queue::MAX_WAITING as u16 };
+            return Err(Error { kind, span: self.block.span() });
+        }
         if status == Status::Ended {
             if framed {
                 out.emit(Canon::Comment("interpreter: percent sign missing from end of file".into()));
@@ -328,7 +353,7 @@ impl Interpreter {
     ) -> Result<Status, Error> {
         let span = self.line.whole();
         if let Some(saved) = self.o_word(start, here, source)? {
-            self.state.restore(&saved, span, &mut Out { sink, span })?;
+            self.state.restore(&saved, span, &mut Out { sink, span, queue: &mut self.queue })?;
         }
         Ok(Status::Running)
     }
@@ -357,7 +382,7 @@ impl Interpreter {
         false
     }
 
-    fn program_call(&self, _: &mut dyn LineSource, _: &mut Out<'_>) -> Result<Option<Status>, Error> {
+    fn program_call(&self, _: &mut dyn LineSource, _: &mut dyn CanonSink) -> Result<Option<Status>, Error> {
         match self.block.has_m(98) {
             true => Err(Error { kind: ErrorKind::ONoMemory, span: self.block.span() }),
             false => Ok(None),

@@ -9,11 +9,6 @@ use crate::settings::Dialect;
 use pkm_canon::{Canon, Direction, InputWait, LengthUnit, MotionControlMode, Plane};
 use pkm_kins::maths;
 
-/// The interpreter's own remarks, as LinuxCNC words them.
-fn remark(out: &mut Out<'_>, text: &str) {
-    out.emit(Canon::Comment(text.into()));
-}
-
 impl State {
     /// The spindles a block means: `$n`, all for `$-1`, `otherwise` without `$`.
     pub(crate) fn spindles_of(&self, block: &Block, otherwise: i32) -> core::ops::Range<i32> {
@@ -60,7 +55,7 @@ impl State {
             Some(940) => (FeedMode::PerMinute, "interpreter: feed mode set to units per minute"),
             Some(_) => (FeedMode::PerTurn, "interpreter: feed mode set to units per revolution"),
         };
-        remark(out, text);
+        out.remark(text);
         self.modal.feed_mode = mode;
         let per_turn = mode == FeedMode::PerTurn;
         let spindle = if per_turn { block.get(b'$').map_or(0, |n| n as i32) } else { 0 };
@@ -333,28 +328,19 @@ impl State {
         if block.has(b'X') {
             block.scale(b'X', if diameter { 0.5 } else { 2.0 });
         }
-        remark(
-            out,
-            if diameter {
-                "interpreter: Lathe diameter mode changed to diameter"
-            } else {
-                "interpreter: Lathe diameter mode changed to radius"
-            },
-        );
+        out.remark(if diameter {
+            "interpreter: Lathe diameter mode changed to diameter"
+        } else {
+            "interpreter: Lathe diameter mode changed to radius"
+        });
     }
 
     /// G40 to G42.1.
     pub(crate) fn compensation(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         match block.g(GGroup::Compensation) {
             None => Ok(()),
-            Some(400) => {
-                remark(out, "interpreter: cutter radius compensation off");
-                Ok(())
-            }
-            Some(code) => {
-                let kind = ErrorKind::GUnsupported { code: crate::error::Code(code) };
-                Err(block.g_error(GGroup::Compensation, kind))
-            }
+            Some(400) => self.compensation_off(block, out),
+            Some(code) => self.compensation_on(code, block, out),
         }
     }
 
@@ -382,14 +368,11 @@ impl State {
         let Some(code) = block.g(GGroup::Distance) else { return };
         let incremental = code == 910;
         if incremental != self.modal.incremental {
-            remark(
-                out,
-                if incremental {
-                    "interpreter: distance mode changed to incremental"
-                } else {
-                    "interpreter: distance mode changed to absolute"
-                },
-            );
+            out.remark(if incremental {
+                "interpreter: distance mode changed to incremental"
+            } else {
+                "interpreter: distance mode changed to absolute"
+            });
             self.modal.incremental = incremental;
         }
     }
@@ -399,14 +382,11 @@ impl State {
         let Some(code) = block.g(GGroup::ArcCentre) else { return };
         let absolute = code == 901;
         if absolute != self.modal.arc_centre_absolute {
-            remark(
-                out,
-                if absolute {
-                    "interpreter: IJK distance mode changed to absolute"
-                } else {
-                    "interpreter: IJK distance mode changed to incremental"
-                },
-            );
+            out.remark(if absolute {
+                "interpreter: IJK distance mode changed to absolute"
+            } else {
+                "interpreter: IJK distance mode changed to incremental"
+            });
             self.modal.arc_centre_absolute = absolute;
         }
     }
@@ -418,14 +398,11 @@ impl State {
             return Err(block.g_error(GGroup::Retract, ErrorKind::CcOn { what: "another retract mode" }));
         }
         self.modal.retract_to_old = code == 980;
-        remark(
-            out,
-            if self.modal.retract_to_old {
-                "interpreter: retract mode set to old_z"
-            } else {
-                "interpreter: retract mode set to r_plane"
-            },
-        );
+        out.remark(if self.modal.retract_to_old {
+            "interpreter: retract mode set to old_z"
+        } else {
+            "interpreter: retract mode set to r_plane"
+        });
         Ok(())
     }
 }

@@ -18,6 +18,13 @@ impl State {
         if code == G1 {
             self.inverse_time_rate(block, straight_length(&self.position, &end), out);
         }
+        self.cutter.arc_refused = false;
+        if let Some(side) = self.compensates() {
+            if block.g(GGroup::NonModal) == Some(G53) {
+                return Err(block.g_error(GGroup::NonModal, ErrorKind::CcOn { what: "G53" }));
+            }
+            return self.straight_compensated(code == G0, side, end, block, out);
+        }
         self.position = end;
         let end = Position::from_array(end);
         out.emit(if code == G0 { Canon::StraightTraverse(end) } else { Canon::StraightFeed(end) });

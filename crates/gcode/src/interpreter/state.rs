@@ -1,5 +1,6 @@
 //! The state a program changes: modes, position, offsets, parameters, tools; and what expressions see of it.
 
+use super::compensation::Compensation;
 use super::cycles::CycleMemory;
 use super::saved::SavedStates;
 use super::splines::Splines;
@@ -31,6 +32,7 @@ pub(crate) struct State {
     pub(crate) g92: [f64; 9],
     pub(crate) tool_offset: [f64; 9],
     pub(crate) rotation_deg: f64,
+    pub(crate) cutter: Compensation,
     pub(crate) cycle_memory: CycleMemory,
     pub(crate) splines: Splines,
     pub(crate) saved: SavedStates,
@@ -58,6 +60,7 @@ impl State {
             g92: [0.0; 9],
             tool_offset: [0.0; 9],
             rotation_deg: 0.0,
+            cutter: Compensation::default(),
             cycle_memory: CycleMemory::default(),
             splines: Splines::default(),
             saved: SavedStates::default(),

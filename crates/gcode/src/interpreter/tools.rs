@@ -74,7 +74,7 @@ impl State {
     }
 
     /// The tool of a number word; 0 is the tool in the spindle.
-    fn tool_of(&self, block: &Block, letter: u8, number: i32) -> Result<Tool, Error> {
+    pub(crate) fn tool_of(&self, block: &Block, letter: u8, number: i32) -> Result<Tool, Error> {
         let slot = self.tools.slot(number);
         slot.and_then(|slot| self.tools.get(slot))
             .copied()
