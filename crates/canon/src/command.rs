@@ -367,6 +367,9 @@ pub enum Canon<'a> {
         /// Q word, or -1.
         q: f64,
     },
+    /// An M code of the machine's own, from 100 to 999 (pkm's; LinuxCNC remaps such codes): stop, let the machine do
+    /// what its file says, go on from where it then stands.
+    MachineCode(i32),
     /// `COMMENT`.
     Comment(Text<'a>),
     /// `MESSAGE`.

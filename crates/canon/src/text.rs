@@ -371,6 +371,7 @@ fn write_state_command(out: &mut Buffer, command: &Canon<'_>, spelling: Spelling
             write_output(out, "SET_MOTION_OUTPUT_VALUE(", index, value)
         }
         Canon::AuxOutputValue { index, value } => write_output(out, "SET_AUX_OUTPUT_VALUE(", index, value),
+        Canon::MachineCode(number) => out.call_indexed("MACHINE_CODE", number, &[]),
         Canon::Comment(text) => out.call_text("COMMENT", text.0),
         Canon::Message(text) => out.call_text("MESSAGE", text.0),
         Canon::Log(text) => out.call_text("LOG", text.0),

@@ -5,6 +5,7 @@ use crate::expression::{self, Reference, Scope};
 use crate::lexer::{self, Fault, Rest, fault, fault_here, into_fault};
 use crate::line::Line;
 use crate::modal::*;
+use crate::settings::MachineCodes;
 use heapless::Vec;
 use pkm_canon::{FileId, Span};
 use pkm_kins::{Axis, AxisSet};
@@ -251,7 +252,9 @@ impl Block {
             }
             b'm' => {
                 let (rest, number) = expression::integer(after, scope)?;
-                self.add_m(line, number, input, rest)?;
+                let group = reader.m_group(number);
+                let group = group.ok_or_else(|| fault(ErrorKind::MUnknown { number }, input, rest))?;
+                self.add_m(line, number, group, input, rest)?;
                 Ok(rest)
             }
             b'n' | b'o' => Err(fault_here(ErrorKind::BadLetter { letter: upper.into() }, input)),
@@ -342,10 +345,10 @@ impl Block {
         &mut self,
         line: &Line,
         number: i32,
+        group: MGroup,
         from: Rest<'_>,
         to: Rest<'_>,
     ) -> Result<(), nom::Err<Fault>> {
-        let group = MGroup::of(number).ok_or_else(|| fault(ErrorKind::MUnknown { number }, from, to))?;
         let slot = &mut self.m[group as usize];
         if *slot >= 0 {
             let kind = ErrorKind::ModalClashM { first: (*slot).into(), second: number, group: group.name() };
@@ -376,9 +379,15 @@ pub(crate) struct Reader {
     /// X words are diameters (G7).
     pub(crate) diameter: bool,
     pub(crate) spindles: u8,
+    pub(crate) machine_codes: MachineCodes,
 }
 
 impl Reader {
+    /// The modal group of an M code; the machine's own are user codes.
+    fn m_group(&self, number: i32) -> Option<MGroup> {
+        if self.machine_codes.contains(number) { Some(MGroup::User) } else { MGroup::of(number) }
+    }
+
     /// Range checks that hold for a letter wherever it is used.
     fn check(&self, letter: u8, value: f64) -> Result<f64, ErrorKind> {
         match letter {

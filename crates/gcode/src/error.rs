@@ -114,6 +114,7 @@ errors! {
     WordMissingM { letter: char, number: i32 } "word-missing" "M{number} needs a {letter} word" "add it to the block";
     AxisUnavailable { letter: char } "axis-unavailable" "this machine has no {letter} axis" "remove the word, or choose another machine";
     AxisClash { first: Code, second: Code } "axis-clash" "G{first} and G{second} both use the axis words" "put them into two blocks";
+    AxisWithMachineCode { number: i32 } "axis-clash" "M{number} changes where the axes are, so nothing may move in its block" "move in a block of its own";
     AxisMissing { code: Code } "axis-missing" "G{code} needs an axis word" "say where to";
     AxisWithoutMotion "axis-without-motion" "axis words, but no motion code is in force" "begin the block with G0, G1 or another motion code";
     AxisWithG80 "axis-without-motion" "axis words with G80" "G80 ends cycles and moves nothing";
@@ -235,6 +236,7 @@ errors! {
     NurbsPoints { points: u16, order: u16 } "nurbs-points" "{points} control points for order {order}" "a spline needs at least as many points as its order, and G5.2 before G5.3";
     NurbsTooMany { limit: u16 } "nurbs-points" "more than {limit} control points" "split the curve";
     NurbsDropped { code: Code } "nurbs-points" "G{code} would drop the control points given since G5.2" "end the spline with G5.3 first";
+    NurbsDroppedM { number: i32 } "nurbs-points" "M{number} would drop the control points given since G5.2" "end the spline with G5.3 first";
     NurbsWeight { value: f64 } "spline-words" "weight P{value}" "weights must be greater than 0";
     ThreadIjk { letter: char } "thread-ijk" "G76 with this {letter} cuts no thread" "I is not 0, J greater than 0, K greater than J";
     ThreadPlane "thread-ijk" "G76 outside the XZ plane" "select G18";

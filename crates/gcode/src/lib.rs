@@ -44,7 +44,7 @@ mod tool_table;
 pub use error::{Code, Error, ErrorKind};
 pub use interpreter::{Interpreter, Status};
 pub use parameters::Parameters;
-pub use settings::{Dialect, Settings};
+pub use settings::{Dialect, MachineCodes, Settings};
 pub use simulation::{SimulatedMachine, canon_text, canon_text_of};
 #[cfg(feature = "std")]
 pub use source::FileSource;

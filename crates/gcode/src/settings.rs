@@ -15,6 +15,35 @@ pub enum Dialect {
     Pkm,
 }
 
+/// The M codes that a machine's own file gives a meaning to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MachineCodes([i16; Self::MOST]);
+
+impl MachineCodes {
+    /// The most codes a machine may have.
+    pub const MOST: usize = 8;
+    /// The least and the greatest number: above all that the language uses but the user's own M100 to M199, which a
+    /// machine may take over.
+    pub const RANGE: core::ops::RangeInclusive<i32> = 100..=999;
+
+    /// `None` if there are more than [`Self::MOST`], or one is outside [`Self::RANGE`].
+    pub fn new(codes: &[i32]) -> Option<Self> {
+        let mut all = Self::default();
+        if codes.len() > Self::MOST || !codes.iter().all(|code| Self::RANGE.contains(code)) {
+            return None;
+        }
+        for (place, code) in all.0.iter_mut().zip(codes) {
+            *place = *code as i16;
+        }
+        Some(all)
+    }
+
+    /// True if the machine has this code.
+    pub fn contains(&self, number: i32) -> bool {
+        Self::RANGE.contains(&number) && self.0.iter().any(|code| i32::from(*code) == number)
+    }
+}
+
 /// Settings of one interpreter; they do not change while a program runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
@@ -30,6 +59,8 @@ pub struct Settings {
     pub block_delete: bool,
     /// Number of spindles, 1 to 8.
     pub spindles: u8,
+    /// M codes of the machine's own; none by default.
+    pub machine_codes: MachineCodes,
     /// Accepted difference of an arc's two radii, inch program.
     pub arc_radius_tolerance_inch: f64,
     /// The same, mm program.
@@ -53,6 +84,7 @@ impl Default for Settings {
             start_units: LengthUnit::Mm,
             block_delete: false,
             spindles: 1,
+            machine_codes: MachineCodes::default(),
             arc_radius_tolerance_inch: 0.002_828_4,
             arc_radius_tolerance_mm: 0.028_284,
             max_idle_blocks: 10_000_000,

@@ -1,12 +1,13 @@
 //! G-code as prose: every Markdown file in `tests/prose` explains a rule; its fenced `ngc` blocks run, and trailing
 //! comments say what each line must do: `; canon: COMMAND(...)` (one per `|`), `; error: [code] word`, where `word`
-//! is what must be underlined. `; canon: -` means no command. A fence `ngc linuxcnc` runs as `rs274` would.
+//! is what must be underlined. `; canon: -` means no command. A fence `ngc linuxcnc` runs as `rs274` would; in a fence
+//! `ngc machine` the machine has codes M428, M429 and M150 of its own.
 
 mod support;
 
 use pkm_canon::text::{Spelling, TextWriter};
 use pkm_canon::{Canon, CanonSink, Span};
-use pkm_gcode::{Interpreter, MemorySource, Settings, Status, ToolTable};
+use pkm_gcode::{Interpreter, MachineCodes, MemorySource, Settings, Status, ToolTable};
 
 /// Collects `(source line, canonical text)`.
 #[derive(Default)]
@@ -42,7 +43,10 @@ fn expectation(line: &str) -> (&str, Option<&str>) {
 fn run(name: &str, first_line: usize, kind: &str, block: &[&str]) -> Vec<String> {
     let mut complaints = Vec::new();
     let program = block.join("\n");
-    let settings = if kind.contains("linuxcnc") { Settings::rs274() } else { Settings::default() };
+    let mut settings = if kind.contains("linuxcnc") { Settings::rs274() } else { Settings::default() };
+    if kind.contains("machine") {
+        settings.machine_codes = MachineCodes::new(&[428, 429, 150]).expect("in range");
+    }
     let mut interpreter = Interpreter::new(settings);
     *interpreter.tools_mut() = ToolTable::parse(support::TOOLS.as_bytes(), |_, _| {}).expect("a table");
     let mut source = MemorySource::new(program.as_bytes());

@@ -71,7 +71,7 @@ impl State {
         let compensation = block.g(GGroup::Compensation);
         let path = block.g(GGroup::Path);
         let io = block.m(MGroup::Io);
-        let user = block.m(MGroup::User).is_some();
+        let user = block.m(MGroup::User).is_some_and(|number| !self.settings.machine_codes.contains(number));
         let spindle = block.m(MGroup::Spindle);
         let roughing = matches!(motion, 710..=712 | 720..=722);
         let lathe = roughing || motion == 700;

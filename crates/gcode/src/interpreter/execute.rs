@@ -27,9 +27,7 @@ impl State {
         self.spindle(block, out)?;
         self.coolant(block, out);
         self.overrides(block, out)?;
-        if let Some(number) = block.m(MGroup::User) {
-            return Err(block.m_error(MGroup::User, ErrorKind::MUnsupported { number }));
-        }
+        synch |= self.user_code(block, out)?;
         if block.g(GGroup::NonModal) == Some(G4) {
             out.emit(Canon::Dwell(block.get(b'P').unwrap_or(0.0)));
         }
@@ -58,6 +56,30 @@ impl State {
             });
         }
         Ok(if synch { Status::Synch } else { Status::Running })
+    }
+
+    /// Group 10: the machine's own codes; no user programs. True if the machine is somewhere else afterwards.
+    fn user_code(&mut self, block: &Block, out: &mut Out<'_>) -> Result<bool, Error> {
+        let Some(number) = block.m(MGroup::User) else { return Ok(false) };
+        let fail = |kind| Err(block.m_error(MGroup::User, kind));
+        if !self.settings.machine_codes.contains(number) {
+            return fail(ErrorKind::MUnsupported { number });
+        }
+        let goes = block.motion.is_some_and(|code| code != G80);
+        let goes_home = matches!(block.g(GGroup::NonModal), Some(G28 | G30));
+        if block.has_axis() || block.has_polar() || goes || goes_home {
+            return fail(ErrorKind::AxisWithMachineCode { number });
+        }
+        if self.modal.compensation.is_some() {
+            return fail(ErrorKind::CcOn { what: "a code of the machine's own" });
+        }
+        if self.splines.is_open() {
+            return fail(ErrorKind::NurbsDroppedM { number });
+        }
+        self.splines.forget();
+        self.cycle_memory.old = None;
+        out.emit(Canon::MachineCode(number));
+        Ok(true)
     }
 
     /// Groups 0 and 16: settings, offsets, home moves.

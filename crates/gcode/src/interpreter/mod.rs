@@ -36,9 +36,9 @@ use state::State;
 pub enum Status {
     /// Go on with the next step.
     Running,
-    /// The block probed, changed the tool or read an input: the next block depends on what the machine did. A
-    /// caller with a machine lets the motion finish and tells the interpreter (see [`Interpreter::set_position`]);
-    /// without one it may go on at once.
+    /// The block probed, changed the tool, read an input or held a code of the machine's own: the next block depends on
+    /// what the machine did. A caller with a machine lets the motion finish and tells the interpreter (see
+    /// [`Interpreter::set_position`]); without one it may go on at once.
     Synch,
     /// The program has ended by M2, M30, M99 or `%`; the rest of the source is not read.
     Ended,

@@ -164,6 +164,7 @@ impl State {
             axes: self.settings.axes,
             diameter: self.modal.diameter,
             spindles: self.settings.spindles.min(8),
+            machine_codes: self.settings.machine_codes,
         }
     }
 
