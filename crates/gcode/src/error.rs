@@ -126,6 +126,8 @@ errors! {
     ParamCc { index: i32 } "param-cc" "#{index} cannot be read while cutter compensation is on" "read it before G41 or after G40";
     ParamNameOpen "param-name" "the parameter name is not closed" "names look like #<name>";
     ParamNoMemory "param-memory" "named parameters need an interpreter with memory (feature alloc)" "use numbered parameters";
+    ParameterFileDamaged "param-file" "the checksum does not fit the content" "the file was cut or changed: restore it from its .bak";
+    ParameterFileOrder { index: i32, last: i32 } "param-file" "parameter {index} comes after {last}" "numbers must rise";
     EqualMissing "param-equal" "'=' is missing in a parameter setting" "write #1 = 2";
     TooManySettings { limit: u8 } "param-count" "more than {limit} parameter settings in one block" "split the block";
     ExprUnclosed "expr-unclosed" "the bracket is not closed" "add ']'";

@@ -40,6 +40,7 @@ pub(crate) fn integer<'a>(input: Rest<'a>, scope: &impl Scope) -> Read<'a, i32> 
 }
 
 /// An expression in brackets.
+#[cfg(feature = "alloc")]
 pub(crate) fn bracketed<'a>(input: Rest<'a>, scope: &impl Scope) -> Read<'a, f64> {
     let (rest, result) = bracket(input, scope, 0)?;
     finite(result, input, rest)

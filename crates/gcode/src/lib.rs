@@ -35,6 +35,8 @@ mod interpreter;
 mod lexer;
 mod line;
 mod modal;
+#[cfg(feature = "alloc")]
+mod parameter_file;
 mod parameters;
 mod settings;
 mod simulation;
@@ -43,6 +45,8 @@ mod tool_table;
 
 pub use error::{Code, Error, ErrorKind};
 pub use interpreter::{Interpreter, Status};
+#[cfg(feature = "alloc")]
+pub use parameter_file::ParameterFile;
 pub use parameters::Parameters;
 pub use settings::{Dialect, MachineCodes, Settings};
 pub use simulation::{SimulatedMachine, canon_text, canon_text_of};

@@ -35,6 +35,7 @@ pub(crate) const fn is_readonly(index: i32) -> bool {
 }
 
 /// Parameters that the parameter file keeps.
+#[cfg(feature = "alloc")]
 pub(crate) const fn is_persistent(index: i32) -> bool {
     matches!(index, 5161..=5169 | 5181..=5189 | 5210..=5230)
         || (index >= 5241 && index <= 5390 && matches!((index - 5221) % 20, 0..=9))

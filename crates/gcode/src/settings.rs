@@ -1,6 +1,6 @@
 //! What the machine and the person set before a program runs.
 
-use pkm_canon::LengthUnit;
+use pkm_canon::{LengthUnit, MACHINE_CODES, MOST_MACHINE_CODES};
 use pkm_kins::{Axis, AxisSet};
 
 /// Whose rules decide where versions differ.
@@ -17,19 +17,13 @@ pub enum Dialect {
 
 /// The M codes that a machine's own file gives a meaning to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct MachineCodes([i16; Self::MOST]);
+pub struct MachineCodes([i16; MOST_MACHINE_CODES]);
 
 impl MachineCodes {
-    /// The most codes a machine may have.
-    pub const MOST: usize = 8;
-    /// The least and the greatest number: above all that the language uses but the user's own M100 to M199, which a
-    /// machine may take over.
-    pub const RANGE: core::ops::RangeInclusive<i32> = 100..=999;
-
-    /// `None` if there are more than [`Self::MOST`], or one is outside [`Self::RANGE`].
+    /// `None` if there are more than [`MOST_MACHINE_CODES`], or one is outside [`MACHINE_CODES`].
     pub fn new(codes: &[i32]) -> Option<Self> {
         let mut all = Self::default();
-        if codes.len() > Self::MOST || !codes.iter().all(|code| Self::RANGE.contains(code)) {
+        if codes.len() > MOST_MACHINE_CODES || !codes.iter().all(|code| MACHINE_CODES.contains(code)) {
             return None;
         }
         for (place, code) in all.0.iter_mut().zip(codes) {
@@ -40,7 +34,7 @@ impl MachineCodes {
 
     /// True if the machine has this code.
     pub fn contains(&self, number: i32) -> bool {
-        Self::RANGE.contains(&number) && self.0.iter().any(|code| i32::from(*code) == number)
+        MACHINE_CODES.contains(&number) && self.0.iter().any(|code| i32::from(*code) == number)
     }
 }
 

@@ -314,7 +314,7 @@ impl State {
             Some(Move::Arc { centre, end, turns, .. }) => Some((centre, end, turns)),
             _ => None,
         };
-        let mut concave = beta < -SMALL || beta > maths::PI + SMALL;
+        let mut concave = !(-SMALL..=maths::PI + SMALL).contains(&beta);
         // Over a half circle and straight on beside it: stay on the outer side instead of looping.
         if corner.turns.is_none()
             && beta > maths::PI - SMALL
@@ -363,9 +363,6 @@ impl State {
     ) -> Option<Point> {
         let radius = self.cutter.radius;
         let tool = self.cutter.tool;
-        let nearest = |a: Point, b: Point| {
-            if distance(a, corner.from) <= distance(b, corner.from) { a } else { b }
-        };
         match (previous_arc, corner.centre) {
             (None, None) => {
                 // Half the angle of the corner; the line before retreats by r / tan of it.
@@ -376,17 +373,26 @@ impl State {
                 Some(beside(tool, before + maths::PI, radius / maths::tan(half)))
             }
             (None, Some((centre, size))) => {
-                let [a, b] = line_and_circle(tool, before, centre, size)?;
-                Some(nearest(a, b))
+                // Backwards it is an arc that a line follows: the turn changes its sense and the tool its side.
+                let turns = -corner.turns.unwrap_or(1);
+                let flipped = if corner.side == Side::Left { Side::Right } else { Side::Left };
+                arc_then_line(centre, size, radius, corner.from, before + maths::PI, turns, flipped)
             }
-            (Some((centre, end, _)), None) => {
-                let start = beside(corner.from, corner.along + corner.outward, radius);
-                let [a, b] = line_and_circle(start, corner.along, centre, distance(centre, end))?;
-                Some(nearest(a, b))
+            (Some((centre, end, turns)), None) => {
+                let size = distance(centre, end);
+                arc_then_line(centre, size, radius, corner.from, corner.along, turns, corner.side)
             }
             (Some((first, end, _)), Some((second, size))) => {
-                let [a, b] = two_circles(first, distance(first, end), second, size)?;
-                Some(nearest(a, b))
+                // The triangle of both centres and the cut: law of cosines at the first centre. Of the two cuts the
+                // one nearer to the corner.
+                let (old, gap) = (distance(first, end), distance(first, second));
+                let cosine = (old * old + gap * gap - size * size) / (2.0 * old * gap);
+                if !(-1.0..=1.0).contains(&cosine) {
+                    return None;
+                }
+                let (towards, opening) = (heading(first, second), maths::acos(cosine));
+                let [a, b] = [towards + opening, towards - opening].map(|angle| beside(first, angle, old));
+                Some(if distance(a, corner.from) <= distance(b, corner.from) { a } else { b })
             }
         }
     }
@@ -407,34 +413,26 @@ struct Corner {
     centre: Option<(Point, f64)>,
 }
 
-/// The two points where a line meets a circle.
-fn line_and_circle(point: Point, angle: f64, centre: Point, radius: f64) -> Option<[Point; 2]> {
-    let (cos, sin) = (maths::cos(angle), maths::sin(angle));
-    let foot = (centre[0] - point[0]) * cos + (centre[1] - point[1]) * sin;
-    let nearest = beside(point, angle, foot);
-    let square = radius * radius - {
-        let d = distance(nearest, centre);
-        d * d
-    };
-    (square >= 0.0).then(|| {
-        let half = maths::sqrt(square);
-        [beside(nearest, angle, half), beside(nearest, angle, -half)]
-    })
-}
-
-/// The two points where two circles meet.
-fn two_circles(a: Point, radius_a: f64, b: Point, radius_b: f64) -> Option<[Point; 2]> {
-    let gap = distance(a, b);
-    if gap == 0.0 {
+/// Where the offset of an arc (`size` = its radius) meets the offset of the line that follows in direction `along`.
+/// `None` where they do not meet.
+fn arc_then_line(
+    centre: Point,
+    size: f64,
+    radius: f64,
+    corner: Point,
+    along: f64,
+    turns: i32,
+    side: Side,
+) -> Option<Point> {
+    let square_to = if turns > 0 { along + QUARTER } else { along - QUARTER };
+    let is_inside = inside(side, turns);
+    // Distance of the centre from the line, then from its offset.
+    let from_line = distance(centre, corner) * maths::cos(square_to - heading(corner, centre));
+    let from_offset = if is_inside { from_line - radius } else { from_line + radius };
+    let ratio = from_offset / size;
+    if !(-1.0..=1.0).contains(&ratio) {
         return None;
     }
-    // Along the line of centres, then square to it.
-    let along = (radius_a * radius_a - radius_b * radius_b + gap * gap) / (2.0 * gap);
-    let square = radius_a * radius_a - along * along;
-    (square >= 0.0).then(|| {
-        let angle = heading(a, b);
-        let foot = beside(a, angle, along);
-        let half = maths::sqrt(square);
-        [beside(foot, angle + QUARTER, half), beside(foot, angle - QUARTER, half)]
-    })
+    let opening = if is_inside == (turns > 0) { -maths::acos(ratio) } else { maths::acos(ratio) };
+    Some(beside(centre, opening + square_to + maths::PI, size))
 }

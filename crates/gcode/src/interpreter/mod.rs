@@ -335,10 +335,10 @@ impl Interpreter {
             return Err(Error { kind, span: self.block.span() });
         }
         if status == Status::Ended {
-            if framed {
-                out.emit(Canon::Comment("interpreter: percent sign missing from end of file".into()));
-            }
             self.phase = Phase::Ended;
+            if framed && !has_closing_percent(source) {
+                out.remark("interpreter: percent sign missing from end of file");
+            }
         }
         Ok(status)
     }
@@ -362,6 +362,16 @@ impl Interpreter {
     fn is_skipping(&self) -> bool {
         self.flow.is_skipping()
     }
+}
+
+/// Reads on to the closing `%`; the rest of the program is not interpreted.
+fn has_closing_percent(source: &mut dyn LineSource) -> bool {
+    while let Ok(Some(text)) = source.next_line() {
+        if text.trim_ascii() == b"%" {
+            return true;
+        }
+    }
+    false
 }
 
 /// Without memory there are no o-words; each is refused by name.

@@ -21,6 +21,7 @@ pub(crate) struct Saved {
     tool_offset: [f64; 9],
     g92_applied: bool,
     /// M73: restore when the sub returns.
+    #[cfg_attr(not(feature = "alloc"), expect(dead_code, reason = "subs need memory"))]
     on_return: bool,
 }
 

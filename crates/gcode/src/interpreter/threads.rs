@@ -99,11 +99,13 @@ impl State {
             spindle,
         };
         // n-th pass at depth J n^(1/R) below the peak while above the full depth; then 1 + H passes at full depth.
-        let (mut pass, mut depth) = (1.0, j);
-        while depth < k {
-            thread.pass(depth, self.modal.feed_override, out);
+        // Compared from the drive line, as LinuxCNC does: the rounding decides whether a last thin pass is cut.
+        let full = i.abs() + k;
+        let (mut pass, mut depth) = (1.0, i.abs() + j);
+        while depth < full {
+            thread.pass(depth - i.abs(), self.modal.feed_override, out);
             pass += 1.0;
-            depth = j * maths::pow(pass, 1.0 / degression);
+            depth = i.abs() + j * maths::pow(pass, 1.0 / degression);
         }
         let spring = block.get(b'H').map_or(0, |h| h as i64).max(0);
         for _ in 0..=spring {

@@ -44,7 +44,6 @@ pub fn pkm(program: &[u8]) -> Outcome {
         message = format!("[{}] {error} at {:?}", error.kind.code(), error.span);
         false
     });
-    drop(writer);
     Outcome { lines: stream(&output), failed_block, message }
 }
 
