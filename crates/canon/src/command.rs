@@ -138,6 +138,13 @@ pub enum InputWait {
     Low,
 }
 
+/// Numbers a machine file may give to M codes of its own ([`Canon::MachineCode`]): above all that the language uses but
+/// the user's M100 to M199, which a machine may take over.
+pub const MACHINE_CODES: core::ops::RangeInclusive<i32> = 100..=999;
+
+/// The most such codes a machine may have.
+pub const MOST_MACHINE_CODES: usize = 8;
+
 /// One canonical machining command. Text and points borrow from the interpreter and live until the next block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
@@ -367,7 +374,7 @@ pub enum Canon<'a> {
         /// Q word, or -1.
         q: f64,
     },
-    /// An M code of the machine's own, from 100 to 999 (pkm's; LinuxCNC remaps such codes): stop, let the machine do
+    /// An M code of the machine's own, of [`MACHINE_CODES`] (pkm's; LinuxCNC remaps such codes): stop, let the machine do
     /// what its file says, go on from where it then stands.
     MachineCode(i32),
     /// `COMMENT`.

@@ -62,6 +62,19 @@ pub struct Tables {
     pub axis: Axes,
     /// `[home]`
     pub home: Spanned<Pose>,
+    /// `[[switch]]`: M codes that switch the mechanism.
+    #[serde(default)]
+    pub switch: Vec<Spanned<Switch>>,
+}
+
+/// One `[[switch]]`.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Switch {
+    /// Number of the M code.
+    pub code: Spanned<i64>,
+    /// What it switches to: `H` or `V` of an HV-Mill, `O` or `X` of an O-X glide.
+    pub to: Spanned<String>,
 }
 
 /// `[servo]`

@@ -22,9 +22,11 @@ mod overrides;
 mod refusal;
 pub mod shipped;
 pub mod source;
+mod switch;
 
 pub use drivers::{DriverTiming, StepTiming};
 pub use file::MachineFile;
 pub use load::read;
 pub use machine::{AxisLimits, Joint, Machine, PathSettings, SingularityGuard};
 pub use refusal::Refusal;
+pub use switch::{Switch, SwitchTarget, Switched};

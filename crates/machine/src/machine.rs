@@ -5,6 +5,7 @@ use crate::drivers::{DriverTiming, StepTiming};
 use crate::file::{self, MachineFile, Number};
 use crate::joint::joints;
 use crate::source::Findings;
+use crate::switch::{Switch, switches};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Axis, JointKind, JointRange, Kinematics, Pose, maths};
@@ -37,6 +38,8 @@ pub struct Machine {
     pub path: PathSettings,
     /// Bounds for the singularity measures.
     pub singularity: SingularityGuard,
+    /// M codes that switch the mechanism, each code once.
+    pub switches: Vec<Switch>,
 }
 
 /// One joint: mm or rad, as the mechanism's [`JointKind`] says.
@@ -113,7 +116,7 @@ pub struct SingularityGuard {
 const SERVO_PERIOD_NS: RangeInclusive<i64> = 10_000..=100_000_000;
 const TIMER_PERIOD_NS: RangeInclusive<i64> = 1..=1_000_000;
 /// Longest average over the joints, servo periods.
-pub const MOST_SMOOTHING_PERIODS: u32 = 64;
+pub(crate) const MOST_SMOOTHING_PERIODS: u32 = 64;
 const DEFAULT_TIMER_PERIOD_NS: u64 = 100;
 const DEFAULT_GUARD: f64 = 0.001;
 const DEFAULT_WARN: f64 = 0.05;
@@ -173,6 +176,7 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
     let home = mechanism.as_ref().and_then(|mechanism| {
         home(tables, mechanism, joints.as_deref()?, axes.as_deref()?, singularity?, findings)
     });
+    let switches = mechanism.as_ref().and_then(|mechanism| switches(tables, mechanism, findings));
     Some(Machine {
         name: name?,
         description: tables.description.clone(),
@@ -186,6 +190,7 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
         timer_period_ns: timer_period_ns?,
         path: path?,
         singularity: singularity?,
+        switches: switches?,
     })
 }
 
