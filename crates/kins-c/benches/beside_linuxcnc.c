@@ -1,4 +1,5 @@
-/* Our kinematics beside LinuxCNC's C modules of the same class, in one process: medians in ns per call, and the ratio.
+/* Our kinematics beside LinuxCNC's C modules of the same class, in one process: medians in ns per call, and the ratio to
+ * LinuxCNC's.
  * Usage: see benches/beside-linuxcnc. The modules are loaded as LinuxCNC loads them; this file stands in for the HAL. */
 #define _GNU_SOURCE
 #include "pkm_kins.h"
@@ -49,21 +50,31 @@ typedef int (*Inverse)(const PkmPose *, double *, const unsigned long *, unsigne
 
 #define POSES 256
 #define RUNS 401
-static PkmPose poses[POSES], seeds[POSES];
-static double joints[POSES][16];
+
+/* One machine with poses in its reach, the way LinuxCNC calls it: through pointers. */
+typedef struct {
+  const char *name;
+  Forward forward;
+  Inverse inverse;
+  PkmMachine machine; /* ours; not used by theirs */
+  PkmPose poses[POSES], seeds[POSES];
+  double joints[POSES][16];
+  double inverse_ns[RUNS], forward_ns[RUNS];
+  int failed; /* poses of which forward found no answer, or another one, in the last run */
+} Case;
 
 static double unit(void) { return (double)rand() / RAND_MAX * 2 - 1; }
 
 /* Poses within reach of `inverse`, in a box about a centre. */
-static void fill(Inverse inverse, PkmPose centre, double mm, double deg) {
+static void fill(Case *c, PkmPose centre, double mm, double deg) {
   for (int i = 0; i < POSES;) {
     PkmPose p = centre;
     p.x += mm * unit(), p.y += mm * unit(), p.z += mm * unit();
-    p.a = deg * unit(), p.b = deg * unit(), p.c = deg * unit();
-    if (inverse(&p, joints[i], NULL, NULL) != 0)
+    p.a += deg * unit(), p.b += deg * unit(), p.c += deg * unit();
+    if (c->inverse(&p, c->joints[i], NULL, NULL) != 0)
       continue;
-    poses[i] = seeds[i] = p;
-    seeds[i].x += 1e-4 * mm, seeds[i].c += deg * 1e-3;
+    c->poses[i] = c->seeds[i] = p;
+    c->seeds[i].x += 1e-4 * mm, c->seeds[i].c += deg * 1e-3;
     i++;
   }
 }
@@ -73,50 +84,63 @@ static int by_size(const void *a, const void *b) {
   return d < 0 ? -1 : d > 0;
 }
 
+static double median(double *runs) {
+  qsort(runs, RUNS, sizeof runs[0], by_size);
+  return runs[RUNS / 2];
+}
+
 static double now(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
   return t.tv_sec * 1e9 + t.tv_nsec;
 }
 
-static double time_inverse(Inverse inverse) {
-  static double runs[RUNS];
+static double one_inverse_run(const Case *c) {
   double out[16], sum = 0;
   unsigned long flags = 0;
-  for (int r = 0; r < RUNS; r++) {
-    double start = now();
-    for (int i = 0; i < POSES; i++) {
-      inverse(&poses[i], out, &flags, &flags);
-      sum += out[0];
-    }
-    runs[r] = (now() - start) / POSES;
+  double start = now();
+  for (int i = 0; i < POSES; i++) {
+    c->inverse(&c->poses[i], out, &flags, &flags);
+    sum += out[0];
   }
-  if (isnan(sum)) puts("NaN");
-  qsort(runs, RUNS, sizeof runs[0], by_size);
-  return runs[RUNS / 2];
+  double ns = (now() - start) / POSES;
+  if (isnan(sum)) printf("%s: NaN\n", c->name), exit(1);
+  return ns;
 }
 
-static double time_forward(Forward forward) {
-  static double runs[RUNS];
-  double worst = 0;
+static double one_forward_run(Case *c) {
   int failed = 0;
   unsigned long flags = 0;
-  for (int r = 0; r < RUNS; r++) {
-    double start = now();
-    failed = 0;
-    for (int i = 0; i < POSES; i++) {
-      PkmPose p = seeds[i];
-      if (forward(joints[i], &p, &flags, &flags) != 0)
-        failed++;
-      else
-        worst = fmax(worst, fabs(p.x - poses[i].x));
-    }
-    runs[r] = (now() - start) / POSES;
+  double start = now();
+  for (int i = 0; i < POSES; i++) {
+    PkmPose p = c->seeds[i];
+    if (c->forward(c->joints[i], &p, &flags, &flags) != 0 || !(fabs(p.x - c->poses[i].x) < 1e-6))
+      failed++;
   }
-  if (failed) printf("  (forward failed for %d of %d poses)\n", failed, POSES);
-  if (worst > 1e-3) printf("  (forward is off by %g)\n", worst);
-  qsort(runs, RUNS, sizeof runs[0], by_size);
-  return runs[RUNS / 2];
+  c->failed = failed;
+  return (now() - start) / POSES;
+}
+
+/* Times all cases in turns, so that whatever else the computer does falls on all of them alike; the first is the yardstick. */
+static void compare(Case *const *cases, int count) {
+  for (int r = 0; r < RUNS; r++)
+    for (int i = 0; i < count; i++) {
+      pkm_use(&cases[i]->machine);
+      cases[i]->inverse_ns[r] = one_inverse_run(cases[i]);
+      cases[i]->forward_ns[r] = one_forward_run(cases[i]);
+    }
+  int failed = 0;
+  double inverse = median(cases[0]->inverse_ns), forward = median(cases[0]->forward_ns);
+  printf("%-26s inverse %6.1f ns       forward %7.1f ns\n", cases[0]->name, inverse, forward);
+  for (int i = 1; i < count; i++) {
+    double ours = median(cases[i]->inverse_ns), back = median(cases[i]->forward_ns);
+    printf("%-26s inverse %6.1f ns %.2f  forward %7.1f ns %.2f\n", cases[i]->name, ours, ours / inverse, back, back / forward);
+    failed += cases[i]->failed;
+  }
+  if (cases[0]->failed)
+    printf("(%s: forward fails for %d of %d poses)\n", cases[0]->name, cases[0]->failed, POSES);
+  if (failed)
+    printf("pkm: forward fails for %d poses\n", failed), exit(1);
 }
 
 static void load(const char *folder, const char *name, Forward *forward, Inverse *inverse) {
@@ -143,49 +167,88 @@ static void must(PkmStatus status, PkmError *error) {
   }
 }
 
+/* One of ours, empty: to be made by a constructor, then filled. */
+static Case *our(const char *name) {
+  Case *c = calloc(1, sizeof *c);
+  c->name = name;
+  c->forward = (Forward)dlsym(RTLD_DEFAULT, "kinematicsForward");
+  c->inverse = (Inverse)dlsym(RTLD_DEFAULT, "kinematicsInverse");
+  pkm_use(&c->machine);
+  return c;
+}
+
+static void joints_differ(const Case *theirs, const Case *ours, int count) {
+  double a[16], b[16], most = 0;
+  pkm_use((PkmMachine *)&ours->machine);
+  for (int i = 0; i < POSES; i++) {
+    theirs->inverse(&ours->poses[i], a, NULL, NULL), ours->inverse(&ours->poses[i], b, NULL, NULL);
+    for (int k = 0; k < count; k++)
+      most = fmax(most, fabs(a[k] - b[k]));
+  }
+  printf("%s and %s: joints differ by at most %.1e\n", theirs->name, ours->name, most);
+}
+
 int main(int argc, char **argv) {
   const char *folder = argc > 1 ? argv[1] : "/usr/lib/linuxcnc/modules";
-  static PkmMachine machine;
   PkmError error;
-  PkmPose middle = {0};
-  Forward forward;
-  Inverse inverse;
-  pkm_use(&machine);
+  Case *cases[16];
+  int n = 0;
 
-  load(folder, "lineardeltakins", &forward, &inverse);
-  PkmLinearDelta delta = {.joint_radius_mm = *pin("lineardeltakins.R"), .joint_length_mm = *pin("lineardeltakins.L")};
-  must(pkm_linear_delta(&machine, &delta, &error), &error);
-  fill(kinematicsInverse, middle, 30, 0);
-  double ours[16], theirs[16];
-  kinematicsInverse(&poses[0], ours, NULL, NULL), inverse(&poses[0], theirs, NULL, NULL);
-  printf("linear delta: joints differ by %.1e\n", fabs(ours[0] - theirs[0]) + fabs(ours[1] - theirs[1]) + fabs(ours[2] - theirs[2]));
-  double delta_inverse = time_inverse(inverse), delta_forward = time_forward(forward);
-  printf("%-34s inverse %6.1f ns  forward %7.1f ns\n", "LinuxCNC lineardeltakins", delta_inverse, delta_forward);
-  double i = time_inverse(kinematicsInverse), f = time_forward(kinematicsForward);
-  printf("%-34s inverse %6.1f ns  forward %7.1f ns  ratio %.2f %.2f\n", "pkm linear delta", i, f, i / delta_inverse, f / delta_forward);
+  Case *theirs = calloc(1, sizeof *theirs);
+  theirs->name = "LinuxCNC lineardeltakins";
+  load(folder, "lineardeltakins", &theirs->forward, &theirs->inverse);
+  Case *delta = our("linear delta");
+  PkmLinearDelta columns = {.joint_radius_mm = *pin("lineardeltakins.R"), .joint_length_mm = *pin("lineardeltakins.L")};
+  must(pkm_linear_delta(&delta->machine, &columns, &error), &error);
+  fill(theirs, (PkmPose){0}, 30, 0);
+  fill(delta, (PkmPose){0}, 30, 0);
+  joints_differ(theirs, delta, 3);
+  cases[n++] = theirs, cases[n++] = delta;
 
-  PkmMoma moma;
-  pkm_moma_parameters(&moma, 'a');
-  must(pkm_moma(&machine, &moma, &error), &error);
-  middle.y = -270;
-  fill(kinematicsInverse, middle, 50, 0);
-  i = time_inverse(kinematicsInverse), f = time_forward(kinematicsForward);
-  printf("%-34s inverse %6.1f ns  forward %7.1f ns  ratio %.2f %.2f\n", "pkm moma-a", i, f, i / delta_inverse, f / delta_forward);
+  static const char *moma_names[] = {"moma-a", "moma-b", "moma-c", "moma-d"};
+  static const PkmPose moma_middles[] = {{.y = -270}, {.y = -270}, {.x = 160, .y = 160}, {.x = 75, .y = 75}};
+  for (int i = 0; i < 4; i++) {
+    PkmMoma moma;
+    Case *c = cases[n++] = our(moma_names[i]);
+    pkm_moma_parameters(&moma, (uint8_t)('a' + i));
+    must(pkm_moma(&c->machine, &moma, &error), &error);
+    fill(c, moma_middles[i], 30, 0);
+  }
   PkmMoma4s moma_4s;
   pkm_moma_4s_parameters(&moma_4s, 0);
-  must(pkm_moma_4s(&machine, &moma_4s, &error), &error);
-  fill(kinematicsInverse, middle, 50, 0);
-  i = time_inverse(kinematicsInverse), f = time_forward(kinematicsForward);
-  printf("%-34s inverse %6.1f ns  forward %7.1f ns  ratio %.2f %.2f\n", "pkm moma-4s-p", i, f, i / delta_inverse, f / delta_forward);
-  PkmOxGlide glide = {.l_mm = 80, .s_mm = 20, .form = 'O', .c_min_mm = 2};
-  must(pkm_ox_glide(&machine, &glide, &error), &error);
-  middle = (PkmPose){.x = 65, .y = 65};
-  fill(kinematicsInverse, middle, 10, 0);
-  i = time_inverse(kinematicsInverse), f = time_forward(kinematicsForward);
-  printf("%-34s inverse %6.1f ns  forward %7.1f ns  ratio %.2f %.2f\n", "pkm ox-glide-o", i, f, i / delta_inverse, f / delta_forward);
+  Case *four = cases[n++] = our("moma-4s-p");
+  must(pkm_moma_4s(&four->machine, &moma_4s, &error), &error);
+  fill(four, (PkmPose){.y = -270}, 30, 0);
+  for (int i = 0; i < 2; i++) {
+    PkmOxGlide glide = {.l_mm = 80, .s_mm = 20, .form = (uint8_t)"OX"[i], .c_min_mm = 2};
+    Case *c = cases[n++] = our(i ? "ox-glide-x" : "ox-glide-o");
+    must(pkm_ox_glide(&c->machine, &glide, &error), &error);
+    fill(c, (PkmPose){.x = 65, .y = 65}, 10, 0);
+  }
+  PkmMomaW wire;
+  pkm_moma_w_parameters(&wire);
+  Case *w = cases[n++] = our("moma-w (two mechanisms)");
+  must(pkm_moma_w(&w->machine, &wire, &error), &error);
+  fill(w, (PkmPose){.x = 10, .y = 20, .u = 30, .v = -10, .z = 50}, 10, 0);
+  PkmHvMachine mill;
+  pkm_hv_machine_parameters(&mill);
+  mill.active = 'V';
+  Case *hv = cases[n++] = our("hv-mill V, 5 axes");
+  must(pkm_hv_machine(&hv->machine, &mill, &error), &error);
+  fill(hv, (PkmPose){.u = 10, .v = -10, .w = 20}, 10, 20);
+  /* The nearest class in LinuxCNC: a mill with a tilting head, without a parallel mechanism. */
+  Case *bridge = cases[n++] = calloc(1, sizeof *bridge);
+  bridge->name = "(LinuxCNC 5axiskins)";
+  load(folder, "5axiskins", &bridge->forward, &bridge->inverse);
+  fill(bridge, (PkmPose){.z = 20}, 10, 20);
+  memcpy(hv->seeds, hv->poses, sizeof hv->seeds); /* the idle mechanism keeps what the seed says */
+  compare(cases, n);
 
+  n = 0;
   pin_count = 0;
-  load(folder, "genhexkins", &forward, &inverse);
+  Case *struts = calloc(1, sizeof *struts);
+  struts->name = "LinuxCNC genhexkins";
+  load(folder, "genhexkins", &struts->forward, &struts->inverse);
   PkmHexapod hexapod = {.start_z_mm = 20};
   for (int k = 0; k < 6; k++)
     for (int axis = 0; axis < 3; axis++) {
@@ -195,22 +258,17 @@ int main(int argc, char **argv) {
       snprintf(name, sizeof name, "genhexkins.platform.%d.%c", k, "xyz"[axis]);
       hexapod.platform_mm[k][axis] = *pin(name);
     }
-  must(pkm_hexapod(&machine, &hexapod, &error), &error);
-  middle = (PkmPose){.z = 20};
-  fill(kinematicsInverse, middle, 3, 10);
-  kinematicsInverse(&poses[0], ours, NULL, NULL), inverse(&poses[0], theirs, NULL, NULL);
-  printf("hexapod: joints differ by %.1e\n", fabs(ours[0] - theirs[0]) + fabs(ours[5] - theirs[5]));
-  double hex_inverse = time_inverse(inverse), hex_forward = time_forward(forward);
-  printf("%-34s inverse %6.1f ns  forward %7.1f ns\n", "LinuxCNC genhexkins", hex_inverse, hex_forward);
-  i = time_inverse(kinematicsInverse), f = time_forward(kinematicsForward);
-  printf("%-34s inverse %6.1f ns  forward %7.1f ns  ratio %.2f %.2f\n", "pkm hexapod", i, f, i / hex_inverse, f / hex_forward);
-
+  Case *hex = our("hexapod");
+  must(pkm_hexapod(&hex->machine, &hexapod, &error), &error);
+  fill(hex, (PkmPose){.z = 20}, 3, 10);
+  fill(struts, (PkmPose){.z = 20}, 3, 10);
+  joints_differ(struts, hex, 6);
+  cases[n++] = struts, cases[n++] = hex;
   PkmLambda6 lambda;
   pkm_lambda6_parameters(&lambda);
-  must(pkm_lambda6(&machine, &lambda, &error), &error);
-  middle = (PkmPose){.z = -1500};
-  fill(kinematicsInverse, middle, 150, 10);
-  i = time_inverse(kinematicsInverse), f = time_forward(kinematicsForward);
-  printf("%-34s inverse %6.1f ns  forward %7.1f ns  ratio %.2f %.2f\n", "pkm lambda6", i, f, i / hex_inverse, f / hex_forward);
+  Case *six = cases[n++] = our("lambda6");
+  must(pkm_lambda6(&six->machine, &lambda, &error), &error);
+  fill(six, (PkmPose){.z = -1500}, 150, 10);
+  compare(cases, n);
   return 0;
 }

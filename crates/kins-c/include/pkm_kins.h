@@ -30,8 +30,8 @@ typedef enum {
 // A machine, ready to run. Opaque: made by a constructor such as `pkm_moma`.
 typedef struct {
   uint64_t made;
-  // Bit i: joint i is rotary. 0: nothing of the machine needs degrees.
-  uint32_t rotary;
+  // Bit i: joint i is rotary; `ROTARY_AXIS`: the pose has angles. 0: nothing of the machine is in degrees.
+  uint32_t degrees;
   uint32_t joint_count;
   uint64_t words[PKM_MACHINE_WORDS];
 } PkmMachine;

@@ -32,6 +32,9 @@ pub const PKM_MACHINE_WORDS: usize = 128;
 const _: () = assert!(PKM_MAX_JOINTS == MAX_JOINTS);
 const _: () = assert!(size_of::<Mechanism>() <= 8 * PKM_MACHINE_WORDS && align_of::<Mechanism>() <= 8);
 
+/// The bit of `PkmMachine::degrees` for angles in the pose.
+const ROTARY_AXIS: u32 = 1 << 31;
+
 /// Marks a machine that one of the constructors made.
 const MADE: u64 = 0x706b_6d2d_6b69_6e73;
 
@@ -56,8 +59,8 @@ pub struct PkmPose {
 #[derive(Clone, Copy)]
 pub struct PkmMachine {
     made: u64,
-    /// Bit i: joint i is rotary. 0: nothing of the machine needs degrees.
-    rotary: u32,
+    /// Bit i: joint i is rotary; `ROTARY_AXIS`: the pose has angles. 0: nothing of the machine is in degrees.
+    degrees: u32,
     joint_count: u32,
     words: [u64; PKM_MACHINE_WORDS],
 }
@@ -123,6 +126,8 @@ fn put(place: &mut [core::ffi::c_char], text: impl fmt::Display) {
     }
 }
 
+#[cold]
+#[inline(never)]
 unsafe fn refuse(
     error: *mut PkmError,
     status: PkmStatus,
@@ -149,11 +154,14 @@ unsafe fn made<'a>(machine: *const PkmMachine) -> Option<&'a PkmMachine> {
     unsafe { machine.as_ref() }.filter(|machine| machine.made == MADE)
 }
 
-/// The mechanism in a machine's storage.
-#[inline]
-unsafe fn mechanism<'a>(machine: *const PkmMachine) -> Option<&'a Mechanism> {
-    // SAFETY: `made` says that a constructor wrote a `Mechanism` into the words (size and alignment are asserted).
-    unsafe { made(machine).map(|machine| &*machine.words.as_ptr().cast::<Mechanism>()) }
+impl PkmMachine {
+    /// The mechanism in a machine's storage.
+    #[inline(always)]
+    fn mechanism(&self) -> &Mechanism {
+        // SAFETY: only a reference from `made` gets here, so a constructor wrote a `Mechanism` into the words (size and
+        // alignment are asserted).
+        unsafe { &*self.words.as_ptr().cast::<Mechanism>() }
+    }
 }
 
 unsafe fn make(
@@ -165,12 +173,15 @@ unsafe fn make(
         // SAFETY: `machine` is not NULL (checked by the callers) and has room for a `Mechanism`.
         Ok(mechanism) => unsafe {
             let joint_count = mechanism.joint_count();
-            let mut rotary = 0;
+            let mut degrees = 0;
             for joint in 0..joint_count {
-                rotary |= u32::from(mechanism.joint_kind(joint) == JointKind::Rotary) << joint;
+                degrees |= u32::from(mechanism.joint_kind(joint) == JointKind::Rotary) << joint;
+            }
+            if mechanism.axes().iter().any(Axis::is_rotary) {
+                degrees |= ROTARY_AXIS;
             }
             let joint_count = joint_count as u32;
-            machine.write(PkmMachine { made: MADE, rotary, joint_count, words: [0; PKM_MACHINE_WORDS] });
+            machine.write(PkmMachine { made: MADE, degrees, joint_count, words: [0; PKM_MACHINE_WORDS] });
             (&raw mut (*machine).words).cast::<Mechanism>().write(mechanism);
             PkmStatus::Ok
         },
@@ -191,40 +202,67 @@ fn from_pose(p: &Pose) -> PkmPose {
     PkmPose { x: p.x, y: p.y, z: p.z, a, b, c, u: p.u, v: p.v, w: p.w }
 }
 
-/// Hands joints in radians to `f`: the caller's own array where nothing is rotary (a copy would cost more than a planar inverse).
-#[inline]
-unsafe fn with_joints<T>(machine: &PkmMachine, joints: *const f64, f: impl FnOnce(&Joints) -> T) -> T {
-    // SAFETY: not NULL (checked by the callers), and PKM_MAX_JOINTS long.
-    let given = unsafe { &*joints.cast::<Joints>() };
-    if machine.rotary == 0 {
-        return f(given);
-    }
+/// Joints in radians.
+fn joints_from(machine: &PkmMachine, given: &Joints) -> Joints {
     let mut all = *given;
     for (i, q) in all.iter_mut().enumerate() {
-        if machine.rotary >> i & 1 == 1 {
+        if machine.degrees >> i & 1 == 1 {
             *q = radians(*q);
         }
     }
-    f(&all)
+    all
 }
 
-/// Hands a pose in radians to `f`: the caller's own where A B C are all 0.
-#[inline]
-fn with_pose<T>(pose: &PkmPose, f: impl FnOnce(&Pose) -> T) -> T {
-    if pose.a == 0.0 && pose.b == 0.0 && pose.c == 0.0 {
-        // SAFETY: both are nine f64 in the same order (`repr(C)`), and 0° is 0 rad.
-        return f(unsafe { &*core::ptr::from_ref(pose).cast::<Pose>() });
+/// Writes the machine's joints in degrees.
+fn joints_to(machine: &PkmMachine, all: &Joints, joints: &mut Joints) {
+    for (i, (place, q)) in joints.iter_mut().zip(all).take(machine.joint_count as usize).enumerate() {
+        *place = if machine.degrees >> i & 1 == 1 { degrees(*q) } else { *q };
     }
-    f(&to_pose(pose))
 }
 
-#[inline]
-unsafe fn joints_to(machine: &PkmMachine, all: &Joints, joints: *mut f64) {
-    for (i, q) in (0..machine.joint_count as usize).zip(all) {
-        let value = if machine.rotary >> i & 1 == 1 { degrees(*q) } else { *q };
-        // SAFETY: the caller's array holds at least the machine's joints.
-        unsafe { joints.add(i).write(value) };
+/// Pose → joints, with the caller's own numbers where nothing of the machine is in degrees.
+#[inline(always)]
+fn inverse(machine: &PkmMachine, pose: &PkmPose, joints: &mut Joints) -> Result<(), InverseError> {
+    // SAFETY: `PkmPose` and `Pose` are both nine f64 in the same order (`repr(C)`).
+    let same = unsafe { &*core::ptr::from_ref(pose).cast::<Pose>() };
+    if machine.degrees == 0 {
+        return machine.mechanism().inverse_into(same, joints);
     }
+    inverse_in_degrees(machine, pose, joints)
+}
+
+#[inline(never)]
+fn inverse_in_degrees(machine: &PkmMachine, pose: &PkmPose, joints: &mut Joints) -> Result<(), InverseError> {
+    let mechanism = machine.mechanism();
+    let pose = to_pose(pose);
+    if machine.degrees == ROTARY_AXIS {
+        return mechanism.inverse_into(&pose, joints);
+    }
+    joints_to(machine, &mechanism.inverse(&pose)?, joints);
+    Ok(())
+}
+
+/// Joints → pose; the old pose is the seed.
+#[inline(always)]
+fn forward(machine: &PkmMachine, joints: &Joints, pose: &mut PkmPose) -> Result<(), ForwardError> {
+    if machine.degrees == 0 {
+        // SAFETY: as in `inverse`.
+        let same = unsafe { &mut *core::ptr::from_mut(pose).cast::<Pose>() };
+        return machine.mechanism().forward_into(joints, same);
+    }
+    forward_in_degrees(machine, joints, pose)
+}
+
+#[inline(never)]
+fn forward_in_degrees(machine: &PkmMachine, joints: &Joints, pose: &mut PkmPose) -> Result<(), ForwardError> {
+    let mechanism = machine.mechanism();
+    let seed = to_pose(pose);
+    *pose = from_pose(&if machine.degrees == ROTARY_AXIS {
+        mechanism.forward(joints, &seed)?
+    } else {
+        mechanism.forward(&joints_from(machine, joints), &seed)?
+    });
+    Ok(())
 }
 
 /// What every constructor does; `None` from `new` is a usage error.
@@ -422,7 +460,7 @@ unsafe fn give<T>(place: *mut T, value: Option<T>) -> PkmStatus {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pkm_joint_count(machine: *const PkmMachine) -> usize {
     // SAFETY: the contract at the head of this file.
-    unsafe { mechanism(machine) }.map_or(0, Kinematics::joint_count)
+    unsafe { made(machine) }.map_or(0, |m| m.joint_count as usize)
 }
 
 /// Pose → joints. `error` may be NULL.
@@ -435,14 +473,12 @@ pub unsafe extern "C" fn pkm_inverse(
 ) -> PkmStatus {
     // SAFETY: the contract at the head of this file.
     unsafe {
-        let (Some(m), Some(pose), false) = (mechanism(machine), pose.as_ref(), joints.is_null()) else {
+        let (Some(m), Some(pose), Some(q)) = (made(machine), pose.as_ref(), joints.cast::<Joints>().as_mut())
+        else {
             return usage(error);
         };
-        match with_pose(pose, |pose| m.inverse(pose)) {
-            Ok(all) => {
-                joints_to(&*machine, &all, joints);
-                PkmStatus::Ok
-            }
+        match inverse(m, pose, q) {
+            Ok(()) => PkmStatus::Ok,
             Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
         }
     }
@@ -458,14 +494,12 @@ pub unsafe extern "C" fn pkm_forward(
 ) -> PkmStatus {
     // SAFETY: the contract at the head of this file.
     unsafe {
-        let (Some(m), Some(pose), false) = (mechanism(machine), pose.as_mut(), joints.is_null()) else {
+        let (Some(m), Some(pose), Some(q)) = (made(machine), pose.as_mut(), joints.cast::<Joints>().as_ref())
+        else {
             return usage(error);
         };
-        match with_pose(pose, |seed| with_joints(&*machine, joints, |q| m.forward(q, seed))) {
-            Ok(found) => {
-                *pose = from_pose(&found);
-                PkmStatus::Ok
-            }
+        match forward(m, q, pose) {
+            Ok(()) => PkmStatus::Ok,
             Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
         }
     }
@@ -481,14 +515,14 @@ pub unsafe extern "C" fn pkm_jacobian(
 ) -> PkmStatus {
     // SAFETY: the contract at the head of this file.
     unsafe {
-        let (Some(m), Some(pose), false) = (mechanism(machine), pose.as_ref(), rows.is_null()) else {
+        let (Some(machine), Some(pose), false) = (made(machine), pose.as_ref(), rows.is_null()) else {
             return usage(error);
         };
         let rows = core::slice::from_raw_parts_mut(rows, PKM_MAX_JOINTS);
-        match m.jacobian(&to_pose(pose)) {
+        match machine.mechanism().jacobian(&to_pose(pose)) {
             Ok(jacobian) => {
                 for ((row, found), joint) in rows.iter_mut().zip(jacobian).zip(0..PKM_MAX_JOINTS) {
-                    let rotary = joint < m.joint_count() && m.joint_kind(joint) == JointKind::Rotary;
+                    let rotary = machine.degrees >> joint & 1 == 1;
                     for ((place, entry), axis) in row.iter_mut().zip(found).zip(Axis::ALL) {
                         let per_degree = if axis.is_rotary() { radians(entry) } else { entry };
                         *place = if rotary { degrees(per_degree) } else { per_degree };
@@ -514,18 +548,19 @@ pub unsafe extern "C" fn pkm_motion(
 ) -> PkmStatus {
     // SAFETY: the contract at the head of this file.
     unsafe {
-        let (Some(m), Some(p), Some(v), Some(a)) =
-            (mechanism(machine), pose.as_ref(), velocity.as_ref(), acceleration.as_ref())
+        let (Some(machine), Some(p), Some(v), Some(a)) =
+            (made(machine), pose.as_ref(), velocity.as_ref(), acceleration.as_ref())
         else {
             return usage(error);
         };
-        if joint_velocity.is_null() || joint_acceleration.is_null() {
+        let joints = |place: *mut f64| place.cast::<Joints>().as_mut();
+        let (Some(rates), Some(second)) = (joints(joint_velocity), joints(joint_acceleration)) else {
             return usage(error);
-        }
-        match m.motion(&to_pose(p), &to_pose(v), &to_pose(a)) {
+        };
+        match machine.mechanism().motion(&to_pose(p), &to_pose(v), &to_pose(a)) {
             Ok(motion) => {
-                joints_to(&*machine, &motion.velocity, joint_velocity);
-                joints_to(&*machine, &motion.acceleration, joint_acceleration);
+                joints_to(machine, &motion.velocity, rates);
+                joints_to(machine, &motion.acceleration, second);
                 PkmStatus::Ok
             }
             Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
@@ -543,11 +578,11 @@ pub unsafe extern "C" fn pkm_singularity(
 ) -> PkmStatus {
     // SAFETY: the contract at the head of this file.
     unsafe {
-        let (Some(m), Some(pose), Some(measures)) = (mechanism(machine), pose.as_ref(), measures.as_mut())
+        let (Some(machine), Some(pose), Some(measures)) = (made(machine), pose.as_ref(), measures.as_mut())
         else {
             return usage(error);
         };
-        match m.singularity(&to_pose(pose)) {
+        match machine.mechanism().singularity(&to_pose(pose)) {
             Ok(Singularity { inverse, inverse_joint, forward }) => {
                 *measures = PkmSingularity { inverse, inverse_joint, forward };
                 PkmStatus::Ok
@@ -568,11 +603,12 @@ pub unsafe extern "C" fn pkm_switch(
 ) -> PkmStatus {
     // SAFETY: the contract at the head of this file.
     unsafe {
-        let (Some(Mechanism::HvMachine(mill)), Some(to)) = (mechanism(machine), spindle(to)) else {
+        let (Some(made), Some(to)) = (made(machine), spindle(to)) else { return usage(error) };
+        let Mechanism::HvMachine(mill) = made.mechanism() else { return usage(error) };
+        let (Some(pose), Some(q)) = (pose.as_mut(), joints.cast::<Joints>().as_ref()) else {
             return usage(error);
         };
-        let (Some(pose), false) = (pose.as_mut(), joints.is_null()) else { return usage(error) };
-        match with_joints(&*machine, joints, |q| mill.switch(to, q, &to_pose(pose))) {
+        match mill.switch(to, &joints_from(made, q), &to_pose(pose)) {
             Ok((switched, found)) => {
                 *pose = from_pose(&found);
                 make(machine, error, Ok(Mechanism::HvMachine(switched)))
@@ -601,8 +637,10 @@ pub unsafe extern "C" fn kinematicsForward(
     _iflags: *mut core::ffi::c_ulong,
 ) -> core::ffi::c_int {
     // SAFETY: the contract at the head of this file.
-    let status = unsafe { pkm_forward(IN_USE.load(Ordering::Acquire), joint, world, core::ptr::null_mut()) };
-    if status == PkmStatus::Ok { 0 } else { -1 }
+    let given =
+        unsafe { (made(IN_USE.load(Ordering::Acquire)), joint.cast::<Joints>().as_ref(), world.as_mut()) };
+    let (Some(m), Some(q), Some(pose)) = given else { return -1 };
+    if forward(m, q, pose).is_ok() { 0 } else { -1 }
 }
 
 /// As LinuxCNC's: world → joints. 0, or −1 if there is no answer. The flags are not used.
@@ -615,8 +653,10 @@ pub unsafe extern "C" fn kinematicsInverse(
     _fflags: *mut core::ffi::c_ulong,
 ) -> core::ffi::c_int {
     // SAFETY: the contract at the head of this file.
-    let status = unsafe { pkm_inverse(IN_USE.load(Ordering::Acquire), world, joint, core::ptr::null_mut()) };
-    if status == PkmStatus::Ok { 0 } else { -1 }
+    let given =
+        unsafe { (made(IN_USE.load(Ordering::Acquire)), world.as_ref(), joint.cast::<Joints>().as_mut()) };
+    let (Some(m), Some(pose), Some(q)) = given else { return -1 };
+    if inverse(m, pose, q).is_ok() { 0 } else { -1 }
 }
 
 /// As LinuxCNC's: 4, `KINEMATICS_BOTH`.

@@ -194,6 +194,30 @@ pub trait Kinematics {
     /// See [`ForwardError`]; joint travel is not checked here.
     fn forward(&self, joints: &Joints, seed: &Pose) -> Result<Pose, ForwardError>;
 
+    /// [`Self::inverse`] straight into the machine's own places of `joints`: the others keep their value, and after an error
+    /// nothing is written. What a servo thread calls: for a planar mechanism moving nine places would cost as much as solving it.
+    ///
+    /// # Errors
+    /// As [`Self::inverse`].
+    #[inline]
+    fn inverse_into(&self, pose: &Pose, joints: &mut Joints) -> Result<(), InverseError> {
+        let all = self.inverse(pose)?;
+        for (place, joint) in joints.iter_mut().zip(all).take(self.joint_count()) {
+            *place = joint;
+        }
+        Ok(())
+    }
+
+    /// [`Self::forward`] in LinuxCNC's manner: `pose` holds the seed, then the answer; after an error still the seed.
+    ///
+    /// # Errors
+    /// As [`Self::forward`].
+    #[inline]
+    fn forward_into(&self, joints: &Joints, pose: &mut Pose) -> Result<(), ForwardError> {
+        *pose = self.forward(joints, pose)?;
+        Ok(())
+    }
+
     /// ∂joints/∂pose at `pose`.
     ///
     /// # Errors

@@ -21,9 +21,9 @@ use crate::errors::{self, ForwardError, GeometryError, InverseError, Key, NoInte
 use crate::kinematics::{
     Branches, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity,
 };
-use crate::maths::{fabs, sqrt};
+use crate::maths::{fabs, sqrt, sqrt_2};
 use crate::pose::{Axis, AxisSet, Pose};
-use crate::vector::{Vec3, add, cross, dot, is_finite, norm, scale};
+use crate::vector::{Vec3, cross, dot, is_finite};
 
 /// Linear delta as written in a machine file.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,6 +40,14 @@ pub struct LinearDeltaParameters {
 pub struct LinearDelta {
     columns: [[f64; 2]; 3],
     rod: f64,
+    /// |u|² of level carriages, 3 R².
+    side2: f64,
+    /// Slack at the edge of reach, −1e-12 L².
+    edge: f64,
+    /// Slack of a horizontal rod, −1e-9 L.
+    below: f64,
+    /// Slack at the plane of the carriages, −1e-9 L³.
+    plane: f64,
 }
 
 /// One solved rod: horizontal vector column → P, and drop.
@@ -59,40 +67,57 @@ impl LinearDelta {
             return Err(GeometryError::NotLess { key, value: radius, than, limit: rod });
         }
         let side = 0.5 * sqrt(3.0) * radius;
-        Ok(Self { columns: [[0.0, radius], [-side, -0.5 * radius], [side, -0.5 * radius]], rod })
+        Ok(Self {
+            columns: [[0.0, radius], [-side, -0.5 * radius], [side, -0.5 * radius]],
+            rod,
+            side2: 3.0 * radius * radius,
+            edge: -1e-12 * rod * rod,
+            below: -1e-9 * rod,
+            plane: -1e-9 * rod * rod * rod,
+        })
     }
 
     #[inline(always)]
     fn rods(&self, pose: &Pose) -> Result<[Rod; 3], InverseError> {
-        let mut rods = [([0.0; 2], 0.0); 3];
-        for ((rod, column), chain) in rods.iter_mut().zip(&self.columns).zip(0u8..) {
-            let w = [pose.x - column[0], pose.y - column[1]];
-            let square = self.rod * self.rod - (w[0] * w[0] + w[1] * w[1]);
-            if !(square >= -1e-12 * self.rod * self.rod) {
-                if !pose.is_finite() {
-                    return Err(InverseError::NotFinite);
-                }
-                let deficit_mm = (sqrt(w[0] * w[0] + w[1] * w[1]) - self.rod).min(f64::MAX);
-                return Err(InverseError::OutOfReach { mechanism: None, chain, deficit_mm });
-            }
-            *rod = (w, sqrt(if square > 0.0 { square } else { 0.0 }));
+        let [wa, wb, wc] = self.columns.map(|column| [pose.x - column[0], pose.y - column[1]]);
+        let square = |w: [f64; 2]| self.rod * self.rod - (w[0] * w[0] + w[1] * w[1]);
+        let (a, b, c) = (square(wa), square(wb), square(wc));
+        // NaN in x or y fails here, too.
+        if !(a >= self.edge && b >= self.edge && c >= self.edge && pose.z.is_finite()) {
+            return Err(self.out_of_reach(pose));
         }
-        // x and y are finite here: a NaN fails the comparison above.
-        if !pose.z.is_finite() {
-            return Err(InverseError::NotFinite);
-        }
+        let clamp = |square: f64| if square > 0.0 { square } else { 0.0 };
+        let [a, b] = sqrt_2([clamp(a), clamp(b)]);
+        let rods = [(wa, a), (wb, b), (wc, sqrt(clamp(c)))];
         // P must lie below the plane of the carriages, where forward will look for it.
-        if self.volume(&rods) < -1e-9 {
+        if Self::volume(&rods) < self.plane {
             return Err(InverseError::WrongAssembly { mechanism: None });
         }
         Ok(rods)
     }
 
-    /// Triple product of the rods' unit vectors: positive with P below the carriages' plane, 0 at a type 2 singularity.
-    #[inline]
-    fn volume(&self, [a, b, c]: &[Rod; 3]) -> f64 {
+    #[cold]
+    fn out_of_reach(&self, pose: &Pose) -> InverseError {
+        if !is_finite([pose.x, pose.y, pose.z]) {
+            return InverseError::NotFinite;
+        }
+        let mut first = (0, 0.0);
+        for (column, chain) in self.columns.iter().zip(0u8..) {
+            let w = [pose.x - column[0], pose.y - column[1]];
+            let square = w[0] * w[0] + w[1] * w[1];
+            if !(self.rod * self.rod - square >= self.edge) {
+                first = (chain, (sqrt(square) - self.rod).min(f64::MAX));
+                break;
+            }
+        }
+        InverseError::OutOfReach { mechanism: None, chain: first.0, deficit_mm: first.1 }
+    }
+
+    /// Triple product of the rods, mm³: positive with P below the carriages' plane, 0 at a type 2 singularity.
+    #[inline(always)]
+    fn volume([a, b, c]: &[Rod; 3]) -> f64 {
         let up = |(w, h): &Rod| [-w[0], -w[1], *h];
-        dot(up(a), cross(up(b), up(c))) / (self.rod * self.rod * self.rod)
+        dot(up(a), cross(up(b), up(c)))
     }
 
     fn guard(&self, rods: &[Rod; 3]) -> Result<(), InverseError> {
@@ -101,30 +126,50 @@ impl LinearDelta {
         if measure >= 1e-9 { Ok(()) } else { Err(InverseError::Singular { measure }) }
     }
 
-    /// P below (−1) or above (+1) the plane of the carriages.
+    /// P below (−1) or above (+1) the plane of the carriages. With u, v from carriage 1 to 2 and 3, n = u × v: circumcentre
+    /// (|v|² u·(u − v) u + |u|² v·(v − u) v)/2n², circumradius |u| |v| |u − v|/2|n|. The columns stand in an equilateral
+    /// triangle, so only the heights vary.
+    #[inline(always)]
     fn intersect(&self, q: &Joints, side: f64) -> Result<Vec3, ForwardError> {
-        let [q1, q2, q3] = [q[0], q[1], q[2]];
-        if !is_finite([q1, q2, q3]) {
-            return Err(ForwardError::NotFinite);
+        let (u, v) = (q[1] - q[0], q[2] - q[0]);
+        // Beyond two rods the spheres cannot meet. NaN and infinities fail here, too.
+        if !(fabs(u) <= 2.0 * self.rod && fabs(v) <= 2.0 * self.rod) {
+            return Err(Self::too_far(q));
         }
-        let too_far = ForwardError::NoIntersection { mechanism: None, reason: NoIntersection::TooFar };
-        // Relative heights: beyond two rods the spheres cannot meet (and squares stay small).
-        if fabs(q2 - q1) > 2.0 * self.rod || fabs(q3 - q1) > 2.0 * self.rod {
-            return Err(too_far);
+        let [[_, r], _, [s, _]] = self.columns;
+        let (uu, vv, ww) = (self.side2 + u * u, self.side2 + v * v, self.side2 + (u - v) * (u - v));
+        let uv = 0.5 * self.side2 + u * v;
+        let n = [1.5 * r * (u - v), s * (u + v), 3.0 * r * s];
+        let inverse = 0.5 / dot(n, n);
+        let square = self.rod * self.rod - 0.5 * inverse * (uu * vv * ww);
+        if !(square >= self.edge) {
+            return Err(Self::too_far(q));
         }
-        let [a, b, c] = self.columns;
-        let u = [b[0] - a[0], b[1] - a[1], q2 - q1];
-        let v = [c[0] - a[0], c[1] - a[1], q3 - q1];
-        let n = cross(u, v);
-        let n2 = dot(n, n);
-        let centre = scale(0.5 / n2, add(scale(dot(v, v), cross(n, u)), scale(dot(u, u), cross(v, n))));
-        let radius = norm(centre);
-        let square = (self.rod - radius) * (self.rod + radius);
-        if !(square >= -1e-12 * self.rod * self.rod) {
-            return Err(too_far);
+        let drop = side * sqrt(2.0 * inverse * if square > 0.0 { square } else { 0.0 });
+        let (f, g) = (inverse * vv * (uu - uv), inverse * uu * (vv - uv));
+        let (x, y) = (s * (g - f), r - 1.5 * r * (f + g));
+        Ok([x + drop * n[0], y + drop * n[1], q[0] + (f * u + g * v) + drop * n[2]])
+    }
+
+    #[cold]
+    fn too_far(q: &Joints) -> ForwardError {
+        if !is_finite([q[0], q[1], q[2]]) {
+            return ForwardError::NotFinite;
         }
-        let drop = side * sqrt(if square > 0.0 { square } else { 0.0 } / n2);
-        Ok(add([a[0], a[1], q1], add(centre, scale(drop, n))))
+        ForwardError::NoIntersection { mechanism: None, reason: NoIntersection::TooFar }
+    }
+
+    /// P below the plane of the carriages, each carriage above P.
+    #[inline(always)]
+    fn platform(&self, q: &Joints) -> Result<Vec3, ForwardError> {
+        // The columns run counter-clockwise, so n points up.
+        let p = self.intersect(q, -1.0)?;
+        for (&q, chain) in q.iter().zip(0u8..3) {
+            if q - p[2] < self.below {
+                return Err(ForwardError::WrongWorkingMode { mechanism: None, chain });
+            }
+        }
+        Ok(p)
     }
 
     #[inline]
@@ -164,15 +209,24 @@ impl Kinematics for LinearDelta {
         Ok(Self::joints(pose, &self.rods(pose)?))
     }
 
+    #[inline(always)]
+    fn inverse_into(&self, pose: &Pose, joints: &mut Joints) -> Result<(), InverseError> {
+        let [(_, a), (_, b), (_, c)] = self.rods(pose)?;
+        [joints[0], joints[1], joints[2]] = [pose.z + a, pose.z + b, pose.z + c];
+        Ok(())
+    }
+
+    #[inline]
     fn forward(&self, joints: &Joints, _: &Pose) -> Result<Pose, ForwardError> {
-        // The columns run counter-clockwise, so n points up.
-        let [x, y, z] = self.intersect(joints, -1.0)?;
-        for (&q, chain) in joints.iter().zip(0u8..3) {
-            if q - z < -1e-9 * self.rod {
-                return Err(ForwardError::WrongWorkingMode { mechanism: None, chain });
-            }
-        }
+        let [x, y, z] = self.platform(joints)?;
         Ok(Pose { x, y, z, ..Pose::ZERO })
+    }
+
+    #[inline(always)]
+    fn forward_into(&self, joints: &Joints, pose: &mut Pose) -> Result<(), ForwardError> {
+        let [x, y, z] = self.platform(joints)?;
+        *pose = Pose { x, y, z, ..Pose::ZERO };
+        Ok(())
     }
 
     /// ∂q/∂(x, y, z) = (−w_x/h, −w_y/h, 1).
@@ -207,7 +261,8 @@ impl Kinematics for LinearDelta {
 
     fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
         let rods = self.rods(pose)?;
-        let mut worst = Singularity { inverse: 1.0, inverse_joint: 0, forward: fabs(self.volume(&rods)) };
+        let volume = Self::volume(&rods) / (self.rod * self.rod * self.rod);
+        let mut worst = Singularity { inverse: 1.0, inverse_joint: 0, forward: fabs(volume) };
         for ((_, h), joint) in rods.iter().zip(0..) {
             if h / self.rod < worst.inverse {
                 (worst.inverse, worst.inverse_joint) = (h / self.rod, joint);
@@ -245,7 +300,7 @@ impl Kinematics for LinearDelta {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vector::sub;
+    use crate::vector::{norm, sub};
 
     #[test]
     fn rods_have_their_length() {

@@ -72,6 +72,14 @@ macro_rules! mechanisms {
             fn forward(&self, joints: &Joints, seed: &Pose) -> Result<Pose, ForwardError> {
                 match self { $(Self::$name(m) => Kinematics::forward(m, joints, seed)),+ }
             }
+            #[inline(always)]
+            fn inverse_into(&self, pose: &Pose, joints: &mut Joints) -> Result<(), InverseError> {
+                match self { $(Self::$name(m) => m.inverse_into(pose, joints)),+ }
+            }
+            #[inline(always)]
+            fn forward_into(&self, joints: &Joints, pose: &mut Pose) -> Result<(), ForwardError> {
+                match self { $(Self::$name(m) => m.forward_into(joints, pose)),+ }
+            }
             fn jacobian(&self, pose: &Pose) -> Result<Jacobian, InverseError> {
                 match self { $(Self::$name(m) => Kinematics::jacobian(m, pose)),+ }
             }

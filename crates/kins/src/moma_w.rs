@@ -207,6 +207,16 @@ impl MomaW {
         InverseError::WireTilt { tangent: sqrt(square) / fabs(bz), limit: self.max_tangent }
     }
 
+    /// The joints of both mechanisms, mm.
+    #[inline]
+    fn pairs(&self, pose: &Pose) -> Result<[[f64; 2]; 2], InverseError> {
+        let [p1, p2] = self.wire(pose)?.ends;
+        let [m1, m2] = &self.mechanisms;
+        let p = m1.planar.inverse(p1).map_err(|e| e.of_mechanism(0))?;
+        let q = m2.planar.inverse(p2).map_err(|e| e.of_mechanism(1))?;
+        Ok([p, q])
+    }
+
     /// P₁ in {B1} and P₂ in {B2}, mm: where the wire meets the platform planes.
     ///
     /// # Errors
@@ -290,11 +300,14 @@ impl Kinematics for MomaW {
     }
 
     fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
-        let [p1, p2] = self.wire(pose)?.ends;
-        let [m1, m2] = &self.mechanisms;
-        let p = m1.planar.inverse(p1).map_err(|e| e.of_mechanism(0))?;
-        let q = m2.planar.inverse(p2).map_err(|e| e.of_mechanism(1))?;
+        let [p, q] = self.pairs(pose)?;
         Ok(pack(p, q, pose.z))
+    }
+
+    fn inverse_into(&self, pose: &Pose, joints: &mut Joints) -> Result<(), InverseError> {
+        let [[p1, p2], [q1, q2]] = self.pairs(pose)?;
+        [joints[0], joints[1], joints[2], joints[3], joints[4]] = [p1, p2, q1, q2, pose.z];
+        Ok(())
     }
 
     fn forward(&self, joints: &Joints, _: &Pose) -> Result<Pose, ForwardError> {

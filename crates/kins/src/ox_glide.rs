@@ -223,10 +223,13 @@ impl OxGlide {
 
     fn pack(&self, x: f64, c: f64, z: f64) -> Joints {
         let mut joints = [0.0; MAX_JOINTS];
-        joints[0] = x - self.s / 2.0 - c;
-        joints[1] = x + self.s / 2.0 + c;
-        joints[2] = z;
+        [joints[0], joints[1], joints[2]] = self.sliders(x, c, z);
         joints
+    }
+
+    #[inline]
+    fn sliders(&self, x: f64, c: f64, z: f64) -> [f64; 3] {
+        [x - self.s / 2.0 - c, x + self.s / 2.0 + c, z]
     }
 }
 
@@ -265,6 +268,17 @@ impl Kinematics for OxGlide {
         Ok(self.pack(pose.x, self.half_span(pose.y)?, pose.z))
     }
 
+    #[inline(always)]
+    fn inverse_into(&self, pose: &Pose, joints: &mut Joints) -> Result<(), InverseError> {
+        if !(pose.x.is_finite() && pose.z.is_finite()) {
+            return Err(InverseError::NotFinite);
+        }
+        let c = self.half_span(pose.y)?;
+        [joints[0], joints[1], joints[2]] = self.sliders(pose.x, c, pose.z);
+        Ok(())
+    }
+
+    #[inline]
     fn forward(&self, joints: &Joints, _: &Pose) -> Result<Pose, ForwardError> {
         let [ab, cd, z] = [joints[0], joints[1], joints[2]];
         if !(ab.is_finite() && cd.is_finite() && z.is_finite()) {

@@ -31,7 +31,7 @@ use crate::errors::{self, ForwardError, GeometryError, InverseError, Key, NoInte
 use crate::kinematics::{
     Branches, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity,
 };
-use crate::maths::{cos_sin_deg, fabs, sqrt};
+use crate::maths::{cos_sin_deg, fabs, sqrt, sqrt_2};
 use crate::pose::{Axis, AxisSet, Pose};
 
 /// A point or vector in the plane, mm.
@@ -78,6 +78,8 @@ struct Chain {
     mode: f64,
     /// m: the inner side of the guide.
     inward: f64,
+    /// Slack at the edge of reach, −EDGE l².
+    edge: f64,
 }
 
 /// A valid planar mechanism.
@@ -85,6 +87,17 @@ struct Chain {
 pub struct Planar {
     chains: [Chain; 2],
     assembly: f64,
+    /// s sin, s cos of the angle from guide 1 to guide 2.
+    guides: Vec2,
+    /// Slack of the assembly's side, −1e-9 l₁ l₂.
+    edge: f64,
+    /// l₁ + l₂ and l₁ − l₂.
+    far: f64,
+    fold: f64,
+    /// Slack of d² at stretched links, at folded links; at most this: coincident centres. All mm².
+    far_edge: f64,
+    fold_edge: f64,
+    near: f64,
     one_sided: bool,
 }
 
@@ -127,20 +140,20 @@ fn clamp(x: f64) -> f64 {
 }
 
 impl Chain {
-    /// p and L; `None` beyond the edge of reach (also for NaN).
-    #[inline]
-    fn solve(&self, t: Vec2, mode: f64) -> Option<(f64, Vec2, f64)> {
-        let a = self.direction;
+    /// B, N and d = l² − N²: T along the guide, off it, and what is left for the link. Out of reach unless d ≥ `edge`
+    /// (NaN is out of reach, too).
+    #[inline(always)]
+    fn project(&self, t: Vec2) -> (f64, f64, f64) {
         let k = sub(t, self.origin);
-        let b = dot(a, k);
-        let n = cross(a, k);
-        let d = (self.link - fabs(n)) * (self.link + fabs(n));
-        if !(d >= -EDGE * self.link * self.link) {
-            return None;
-        }
-        let root = mode * sqrt(clamp(d));
-        // L = k − p a = N perp(a) − σ√d a
-        Some((b + root, [-n * a[1] - root * a[0], n * a[0] - root * a[1]], -root))
+        let n = cross(self.direction, k);
+        (dot(self.direction, k), n, (self.link - fabs(n)) * (self.link + fabs(n)))
+    }
+
+    /// L = k − p a = N perp(a) − σ√d a
+    #[inline(always)]
+    fn link(&self, n: f64, root: f64) -> Vec2 {
+        let a = self.direction;
+        [-n * a[1] - root * a[0], n * a[0] - root * a[1]]
     }
 
     #[inline]
@@ -174,6 +187,7 @@ impl Planar {
                 link: errors::length(Key::at("l_mm", i), link)?,
                 mode: errors::sign(Key::at("working_mode", i), mode)?,
                 inward: 0.0,
+                edge: 0.0,
             })
         };
         let [r1, r2] = p.reference_mm;
@@ -209,7 +223,23 @@ impl Planar {
         };
         first.inward = inward(&first, r1, r2);
         second.inward = inward(&second, r2, r1);
-        Ok(Self { chains: [first, second], assembly, one_sided: p.one_sided })
+        first.edge = -EDGE * l1 * l1;
+        second.edge = -EDGE * l2 * l2;
+        let (a1, a2) = (first.direction, second.direction);
+        let guides = [assembly * cross(a1, a2), assembly * dot(a1, a2)];
+        let (far, fold) = (l1 + l2, l1 - l2);
+        Ok(Self {
+            chains: [first, second],
+            assembly,
+            guides,
+            edge: -1e-9 * l1 * l2,
+            far,
+            fold,
+            far_edge: -2.0 * EDGE * far * far,
+            fold_edge: -2.0 * EDGE * far * fabs(fold),
+            near: EDGE * far * (EDGE * far),
+            one_sided: p.one_sided,
+        })
     }
 
     /// The links' lengths, mm.
@@ -222,7 +252,7 @@ impl Planar {
     /// # Errors
     /// `NotFinite`; `OutOfReach` if T + oᵢ is farther than lᵢ from guide line i; `WrongAssembly`; `GuideSide` if
     /// the guides are one-sided. Travel is not checked.
-    #[inline]
+    #[inline(always)]
     pub fn inverse(&self, t: Vec2) -> Result<[f64; 2], InverseError> {
         Ok(self.solve(t)?.joints)
     }
@@ -234,21 +264,26 @@ impl Planar {
     #[inline(always)]
     pub fn solve(&self, t: Vec2) -> Result<PlanarState, InverseError> {
         let [c1, c2] = &self.chains;
-        let (Some((p1, l1, w1)), Some((p2, l2, w2))) = (c1.solve(t, c1.mode), c2.solve(t, c2.mode)) else {
+        // Both chains side by side: two roots take the time of one.
+        let ((b1, n1, d1), (b2, n2, d2)) = (c1.project(t), c2.project(t));
+        if !(d1 >= c1.edge && d2 >= c2.edge) {
             return Err(self.out_of_reach(t));
-        };
-        // cross(C₂ − C₁, T − C₁) = cross(L₁ − L₂, L₁) = cross(L₁, L₂)
-        if !(self.assembly * cross(l1, l2) >= -1e-9 * c1.link * c2.link) {
+        }
+        let [root1, root2] = sqrt_2([clamp(d1), clamp(d2)]);
+        let (root1, root2) = (c1.mode * root1, c2.mode * root2);
+        // s cross(C₂ − C₁, T − C₁) = s cross(L₁ − L₂, L₁) = s cross(L₁, L₂), L by L in the frame of its guide
+        let [sine, cosine] = self.guides;
+        let side = sine * (n1 * n2 + root1 * root2) + cosine * (n1 * root2 - n2 * root1);
+        if !(side >= self.edge) {
             return Err(InverseError::WrongAssembly { mechanism: None });
         }
-        if self.one_sided {
-            self.guide_side(t).map_err(|(chain, excess_mm)| InverseError::GuideSide {
-                mechanism: None,
-                chain,
-                excess_mm,
-            })?;
+        let (l1, l2) = (c1.link(n1, root1), c2.link(n2, root2));
+        if self.one_sided
+            && let Some((chain, excess_mm)) = self.guide_side([n1, n2])
+        {
+            return Err(InverseError::GuideSide { mechanism: None, chain, excess_mm });
         }
-        Ok(PlanarState { joints: [p1, p2], links: [l1, l2], along: [w1, w2] })
+        Ok(PlanarState { joints: [b1 + root1, b2 + root2], links: [l1, l2], along: [-root1, -root2] })
     }
 
     #[cold]
@@ -257,21 +292,23 @@ impl Planar {
             return InverseError::NotFinite;
         }
         let [c1, c2] = &self.chains;
-        let (chain, c) = if c1.solve(t, 1.0).is_none() { (0, c1) } else { (1, c2) };
+        let (chain, c) = if c1.project(t).2 >= c1.edge { (1, c2) } else { (0, c1) };
         let deficit = fabs(c.distance(t)) - c.link;
         // Far beyond 1e154 mm the distance itself overflows.
         InverseError::OutOfReach { mechanism: None, chain, deficit_mm: deficit.min(f64::MAX) }
     }
 
-    /// One-sided guides: mᵢ Nᵢ ≥ 0; otherwise the chain and the excess (mm).
-    fn guide_side(&self, t: Vec2) -> Result<(), (u8, f64)> {
-        for (c, number) in self.chains.iter().zip(0u8..) {
-            let side = c.inward * c.distance(t);
-            if side < -1e-9 {
-                return Err((number, -side));
-            }
+    /// One-sided guides want mᵢ Nᵢ ≥ 0: the first chain on the outer side, and how far (mm).
+    #[inline]
+    fn guide_side(&self, [n1, n2]: Vec2) -> Option<(u8, f64)> {
+        let [side1, side2] = [self.chains[0].inward * n1, self.chains[1].inward * n2];
+        if side1 < -1e-9 {
+            Some((0, -side1))
+        } else if side2 < -1e-9 {
+            Some((1, -side2))
+        } else {
+            None
         }
-        Ok(())
     }
 
     /// p₁, p₂ (mm) → T (mm), in the configured assembly mode.
@@ -279,6 +316,7 @@ impl Planar {
     /// # Errors
     /// `NotFinite`; `NoIntersection`; `WrongWorkingMode` if the pose found has the other root in the inverse;
     /// `GuideSide` if the guides are one-sided. Travel is not checked.
+    #[inline(always)]
     pub fn forward(&self, p: [f64; 2]) -> Result<Vec2, ForwardError> {
         let (t, links) = self.intersect(p, self.assembly)?;
         for ((c, l), chain) in self.chains.iter().zip(links).zip(0u8..) {
@@ -286,49 +324,47 @@ impl Planar {
                 return Err(ForwardError::WrongWorkingMode { mechanism: None, chain });
             }
         }
-        if self.one_sided {
-            self.guide_side(t).map_err(|(chain, excess_mm)| ForwardError::GuideSide {
-                mechanism: None,
-                chain,
-                excess_mm,
-            })?;
+        if self.one_sided
+            && let [c1, c2] = &self.chains
+            && let Some((chain, excess_mm)) = self.guide_side([c1.distance(t), c2.distance(t)])
+        {
+            return Err(ForwardError::GuideSide { mechanism: None, chain, excess_mm });
         }
         Ok(t)
     }
 
     /// The circles' intersection on one side of the line of centres, and the two link vectors.
+    #[inline(always)]
     fn intersect(&self, p: [f64; 2], side: f64) -> Result<(Vec2, [Vec2; 2]), ForwardError> {
-        if !(p[0].is_finite() && p[1].is_finite()) {
-            return Err(ForwardError::NotFinite);
-        }
-        let none = |reason| Err(ForwardError::NoIntersection { mechanism: None, reason });
         let [a, b] = &self.chains;
-        let (l1, l2) = (a.link, b.link);
         let c1 = along(a.origin, p[0], a.direction);
-        let c2 = along(b.origin, p[1], b.direction);
-        let span = sub(c2, c1);
-        let far = l1 + l2;
-        // A distance beyond 1e150 would overflow when squared.
-        if fabs(span[0]) > 1e9 || fabs(span[1]) > 1e9 {
-            return none(NoIntersection::TooFar);
+        let span = sub(along(b.origin, p[1], b.direction), c1);
+        // d², and what it is short of stretched and past folded links. All NaN and infinities end in the error.
+        let d2 = dot(span, span);
+        let (stretched, folded) = (self.far * self.far - d2, d2 - self.fold * self.fold);
+        if !(stretched >= self.far_edge && folded >= self.fold_edge && d2 > self.near) {
+            return Err(self.no_intersection(p, d2));
         }
-        let d = sqrt(dot(span, span));
-        if !(d > EDGE * far) {
-            return none(NoIntersection::Coincident);
-        }
-        // l₁ − l₂ first: near coincident centres d is far smaller than either.
-        let (stretched, fold1, fold2) = (far - d, d + (l1 - l2), d - (l1 - l2));
-        if stretched < -EDGE * far {
-            return none(NoIntersection::TooFar);
-        }
-        if fold1 < -EDGE * far || fold2 < -EDGE * far {
-            return none(NoIntersection::TooClose);
-        }
-        let e = [span[0] / d, span[1] / d];
-        let f = 0.5 * (d + (l1 - l2) * (l1 + l2) / d);
-        let h = side * sqrt((far + d) * clamp(stretched) * clamp(fold1) * clamp(fold2)) / (2.0 * d);
-        let link1 = [f * e[0] - h * e[1], f * e[1] + h * e[0]];
+        // L₁ = f e + h perp(e) with e = span/d; f/d and h/d need no root of d².
+        let f = 0.5 + 0.5 * (self.fold * self.far) / d2;
+        let h = side * sqrt(clamp(stretched) * clamp(folded)) / (2.0 * d2);
+        let link1 = [f * span[0] - h * span[1], f * span[1] + h * span[0]];
         Ok((along(c1, 1.0, link1), [link1, sub(link1, span)]))
+    }
+
+    #[cold]
+    fn no_intersection(&self, p: [f64; 2], d2: f64) -> ForwardError {
+        if !(p[0].is_finite() && p[1].is_finite()) {
+            return ForwardError::NotFinite;
+        }
+        let reason = if d2 <= self.near {
+            NoIntersection::Coincident
+        } else if d2 < self.far * self.far {
+            NoIntersection::TooClose
+        } else {
+            NoIntersection::TooFar
+        };
+        ForwardError::NoIntersection { mechanism: None, reason }
     }
 
     /// K = ∂p/∂T at a solved state: rows joints, dimensionless.
@@ -423,9 +459,11 @@ impl Planar {
     pub fn inverse_all(&self, t: Vec2) -> Branches<[f64; 2]> {
         let mut all = Branches::new();
         let [c1, c2] = &self.chains;
-        for (m1, m2) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
-            if let (Some((p1, ..)), Some((p2, ..))) = (c1.solve(t, m1 * c1.mode), c2.solve(t, m2 * c2.mode)) {
-                all.push([p1, p2]);
+        let ((b1, _, d1), (b2, _, d2)) = (c1.project(t), c2.project(t));
+        if d1 >= c1.edge && d2 >= c2.edge {
+            let (root1, root2) = (c1.mode * sqrt(clamp(d1)), c2.mode * sqrt(clamp(d2)));
+            for (m1, m2) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+                all.push([b1 + m1 * root1, b2 + m2 * root2]);
             }
         }
         all
@@ -474,9 +512,23 @@ impl Kinematics for Planar {
         Ok(joints(Planar::inverse(self, [pose.x, pose.y])?))
     }
 
+    #[inline(always)]
+    fn inverse_into(&self, pose: &Pose, joints: &mut Joints) -> Result<(), InverseError> {
+        [joints[0], joints[1]] = Planar::inverse(self, [pose.x, pose.y])?;
+        Ok(())
+    }
+
+    #[inline]
     fn forward(&self, p: &Joints, _: &Pose) -> Result<Pose, ForwardError> {
         let [x, y] = Planar::forward(self, [p[0], p[1]])?;
         Ok(Pose { x, y, ..Pose::ZERO })
+    }
+
+    #[inline(always)]
+    fn forward_into(&self, p: &Joints, pose: &mut Pose) -> Result<(), ForwardError> {
+        let [x, y] = Planar::forward(self, [p[0], p[1]])?;
+        *pose = Pose { x, y, ..Pose::ZERO };
+        Ok(())
     }
 
     fn jacobian(&self, pose: &Pose) -> Result<Jacobian, InverseError> {
@@ -546,12 +598,29 @@ macro_rules! planar_kinematics {
             fn inverse(&self, pose: &$crate::Pose) -> Result<$crate::Joints, $crate::InverseError> {
                 $crate::Kinematics::inverse(&self.planar, pose)
             }
+            #[inline(always)]
+            fn inverse_into(
+                &self,
+                pose: &$crate::Pose,
+                joints: &mut $crate::Joints,
+            ) -> Result<(), $crate::InverseError> {
+                self.planar.inverse_into(pose, joints)
+            }
+            #[inline]
             fn forward(
                 &self,
                 joints: &$crate::Joints,
                 seed: &$crate::Pose,
             ) -> Result<$crate::Pose, $crate::ForwardError> {
                 $crate::Kinematics::forward(&self.planar, joints, seed)
+            }
+            #[inline(always)]
+            fn forward_into(
+                &self,
+                joints: &$crate::Joints,
+                pose: &mut $crate::Pose,
+            ) -> Result<(), $crate::ForwardError> {
+                self.planar.forward_into(joints, pose)
             }
             fn jacobian(&self, pose: &$crate::Pose) -> Result<$crate::Jacobian, $crate::InverseError> {
                 self.planar.jacobian(pose)

@@ -126,6 +126,44 @@ fn round_trip_from_poses() {
     });
 }
 
+/// The calls of a servo thread write the same bits as the others, touch no other place, and nothing at all after an error.
+#[test]
+fn writing_in_place_is_the_same() {
+    for_all("in place", |case, rng, count| {
+        let m = &case.mechanism;
+        let mut refused = 0;
+        for _ in 0..count {
+            let pose = case.any_pose(rng);
+            let untouched = [f64::MAX; MAX_JOINTS];
+            let mut joints = untouched;
+            let written = m.inverse_into(&pose, &mut joints);
+            let found = m.inverse(&pose);
+            assert_eq!(written, found.map(|_| ()), "{pose:?}");
+            let expected = match found {
+                Ok(all) => std::array::from_fn(|i| if i < m.joint_count() { all[i] } else { f64::MAX }),
+                Err(_) => untouched,
+            };
+            assert_eq!(joints.map(f64::to_bits), expected.map(f64::to_bits), "{pose:?}");
+
+            let mut q = found.unwrap_or([100.0; MAX_JOINTS]);
+            if rng.below(4) == 0 {
+                q = q.map(|joint| joint + rng.between(-300.0, 300.0));
+            }
+            let seed = near(case, &pose, rng);
+            let mut place = seed;
+            let written = m.forward_into(&q, &mut place);
+            let found = m.forward(&q, &seed);
+            assert_eq!(written, found.map(|_| ()), "{q:?}");
+            refused += usize::from(found.is_err());
+            assert_eq!(
+                place.to_array().map(f64::to_bits),
+                found.unwrap_or(seed).to_array().map(f64::to_bits)
+            );
+        }
+        assert!(case.mechanism.kind() == "Cartesian" || refused > 0, "{}: no joints were refused", case.name);
+    });
+}
+
 #[test]
 fn round_trip_from_joints() {
     for_all("joints", |case, rng, count| {

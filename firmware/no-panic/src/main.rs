@@ -21,6 +21,10 @@ fn exercise(mechanism: &Mechanism) {
     let joints = unknown([0.0; MAX_JOINTS]);
     let _ = black_box(mechanism.inverse(&pose));
     let _ = black_box(mechanism.forward(&joints, &pose));
+    let (mut place, mut found) = (unknown(joints), unknown(pose));
+    let _ = black_box(mechanism.inverse_into(&pose, &mut place));
+    let _ = black_box(mechanism.forward_into(&joints, &mut found));
+    black_box((place, found));
     let _ = black_box(mechanism.jacobian(&pose));
     let _ = black_box(mechanism.motion(&pose, &unknown(pose), &unknown(pose)));
     let _ = black_box(mechanism.singularity(&pose));
