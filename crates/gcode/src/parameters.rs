@@ -42,6 +42,7 @@ pub(crate) const fn is_persistent(index: i32) -> bool {
 }
 
 /// Arguments of a sub: #1 to #30.
+#[cfg(feature = "alloc")]
 pub(crate) const ARGUMENTS: usize = 30;
 
 /// All parameters of a program.

@@ -106,16 +106,9 @@ impl State {
         let depth_word = depth_word.unwrap_or(memory.depth);
         let present = self.position[axes.normal];
         let mut old = memory.old.unwrap_or(present);
-        let (mut at, mut step) = ([self.position[axes.first], self.position[axes.second]], [0.0; 2]);
         let (r, bottom) = match self.modal.incremental {
-            false => {
-                at = [block.axis(axes.first).unwrap_or(at[0]), block.axis(axes.second).unwrap_or(at[1])];
-                (r_word, depth_word)
-            }
-            true => {
-                step = [axes.first, axes.second].map(|axis| block.axis(axis).unwrap_or(0.0));
-                (r_word + old, depth_word + r_word + old)
-            }
+            false => (r_word, depth_word),
+            true => (r_word + old, depth_word + r_word + old),
         };
         if r < bottom {
             let kind = ErrorKind::CycleRBelow { r, depth: bottom };
@@ -140,7 +133,9 @@ impl State {
         // After a switch to G98 the tool rises to the old height first.
         let mut height = self.position[axes.normal].max(clear);
         for _ in 0..repeats {
-            at = [at[0] + step[0], at[1] + step[1]];
+            // In G91 each repeat goes on from the last hole; polar words turn on.
+            let next = self.end_point(block)?;
+            let at = [next[axes.first], next[axes.second]];
             let mut hole = Hole { out: &mut *out, position: &mut self.position, axes, at };
             hole.traverse(height);
             if height != r {
@@ -152,8 +147,6 @@ impl State {
             drill(&cycle, &mut self.modal, &self.settings, &mut hole);
             height = clear;
         }
-        self.position[axes.first] = at[0];
-        self.position[axes.second] = at[1];
         self.position[axes.normal] = clear;
         if path != MotionControlMode::ExactPath {
             out.emit(Canon::SetMotionControlMode(path));

@@ -91,8 +91,14 @@ impl State {
             core::array::from_fn(|axis| block.axis(axis).unwrap_or(present[axis]))
         };
         let tool_row = |state: &Self| -> Result<[f64; 9], Error> {
-            let number = block.get(b'H').unwrap_or(0.0) as i32;
-            let tool = state.tool_of(block, b'H', number)?;
+            let tool = match block.get(b'H') {
+                Some(number) => state.tool_of(block, b'H', number as i32)?,
+                // The tool in the spindle; in the block that changes it, the new one.
+                None => {
+                    let slot = if block.m(MGroup::Tool).is_some() { state.loaded_slot } else { 0 };
+                    state.tools.get(slot).copied().unwrap_or_default()
+                }
+            };
             Ok(state.program_units(tool.offset.to_array()))
         };
         let offset = match code {
