@@ -21,6 +21,8 @@ pub enum Event {
     },
     /// Stop and let the operator or the end of the program have its turn.
     Stop,
+    /// An M code of the machine's own: stop, then the machine does what its file says (see [`Frame::set_position`]).
+    MachineCode(i32),
     /// A motion this planner cannot make: the program must not run.
     Unsupported(&'static str),
 }
@@ -70,6 +72,11 @@ impl Frame {
         &self.position
     }
 
+    /// The machine stands elsewhere than the program took it: machine coordinates, mm and rad.
+    pub fn set_position(&mut self, position: Vector) {
+        self.position = position;
+    }
+
     /// Takes one command and calls `emit` with what it asks of the machine; state changes ask nothing.
     pub fn apply(&mut self, command: &Canon<'_>, span: Span, mut emit: impl FnMut(Event)) {
         match *command {
@@ -89,6 +96,7 @@ impl Frame {
                 emit(Event::Dwell { ns: pkm_kins::maths::round(ns) as u64 });
             }
             Canon::ProgramStop | Canon::ProgramEnd | Canon::Finish => emit(Event::Stop),
+            Canon::MachineCode(number) => emit(Event::MachineCode(number)),
             Canon::SetFeedRate(rate) => self.feed_rate = rate,
             Canon::SetFeedMode { mode, .. } => self.per_turn = mode == 1,
             Canon::SetSpindleSpeed { speed, .. } => self.spindle_rpm = speed.abs(),

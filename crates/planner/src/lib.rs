@@ -22,6 +22,7 @@ mod limits;
 mod merge;
 pub mod path;
 mod planner;
+mod switch;
 
 pub use frame::{Event, Frame};
 pub use jerk::Smoother;

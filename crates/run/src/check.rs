@@ -79,6 +79,9 @@ pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<
                         Event::Unsupported(what) => {
                             checked.add(program, messages::unsupported(program, span, what));
                         }
+                        Event::MachineCode(_) => {
+                            checked.add(program, messages::unsupported(program, span, "a code of the machine's own"));
+                        }
                         Event::Dwell { .. } | Event::Stop => {}
                     }
                 }

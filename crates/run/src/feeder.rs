@@ -230,6 +230,9 @@ impl<'a> Feeder<'a> {
     fn take(&mut self, event: Event, span: Span) -> Result<(), Diagnostic> {
         let pushed = match event {
             Event::Unsupported(what) => return Err(messages::unsupported(self.program, span, what)),
+            Event::MachineCode(_) => {
+                return Err(messages::unsupported(self.program, span, "a code of the machine's own"));
+            }
             Event::Stop => {
                 self.planner.finish();
                 return Ok(());
