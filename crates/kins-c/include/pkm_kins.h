@@ -87,6 +87,21 @@ typedef struct {
   double max_wire_tilt_deg;
 } PkmMomaW;
 
+// One mechanism of the HV-Mill alone, `spindle` `'H'` or `'V'`; `controlled_axes` 3 (no rotary axis), 4 (table) or 5 (table and
+// head, V only).
+typedef struct {
+  uint8_t spindle;
+  uint8_t controlled_axes;
+  PkmMoma4s mechanism;
+  double cr_mm[3];
+  double w0_mm[3];
+  int8_t table_sense;
+  // V only.
+  bool has_head;
+  double head_c_mm[3];
+  int8_t head_sense;
+} PkmHvMill;
+
 // The HV-Mill with both mechanisms. Array entry 0 is H, 1 is V.
 typedef struct {
   PkmMoma4s mechanism[2];
@@ -160,6 +175,12 @@ typedef struct {
   double forward;
 } PkmSingularity;
 
+// Travel of a joint (mm, degrees), both ends included.
+typedef struct {
+  double min;
+  double max;
+} PkmRange;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -175,6 +196,9 @@ PkmStatus pkm_moma_4s(PkmMachine *machine, const PkmMoma4s *parameters, PkmError
 
 // Makes a MOMA-W. `error` may be NULL.
 PkmStatus pkm_moma_w(PkmMachine *machine, const PkmMomaW *parameters, PkmError *error);
+
+// Makes one mechanism of the HV-Mill with carriage, table and head. `error` may be NULL.
+PkmStatus pkm_hv_mill(PkmMachine *machine, const PkmHvMill *parameters, PkmError *error);
 
 // Makes an HV-Mill with both mechanisms. `error` may be NULL.
 PkmStatus pkm_hv_machine(PkmMachine *machine, const PkmHvMachine *parameters, PkmError *error);
@@ -203,6 +227,11 @@ PkmStatus pkm_moma_4s_parameters(PkmMoma4s *parameters,
 
 // Default parameters of MOMA-W. Inferred dimensions.
 PkmStatus pkm_moma_w_parameters(PkmMomaW *parameters);
+
+// Default parameters of one mechanism of the HV-Mill: `'H'` with 3 or 4 axes, `'V'` with 3, 4 or 5. Inferred dimensions.
+PkmStatus pkm_hv_mill_parameters(PkmHvMill *parameters,
+                                 uint8_t spindle,
+                                 uint8_t controlled_axes);
 
 // Default parameters of the HV-Mill with head (fig 2b). Inferred dimensions.
 PkmStatus pkm_hv_machine_parameters(PkmHvMachine *parameters);
@@ -252,6 +281,18 @@ PkmStatus pkm_switch(PkmMachine *machine,
                      const double *joints,
                      PkmPose *pose,
                      PkmError *error);
+
+// O-X glide: the joint move that takes the machine, standing at `joints`, from its form to the other one. Checked: both ends of the
+// move outside the guard and within `travel` (three: AB, CD, Z; NULL: no limits). `end` may be `joints`. Written: `end`, where to drive the sliders linearly and
+// together; `pose`, where the platform is before and after; `after`, the machine once the move is done (may be `machine` itself).
+// Nothing moves, and after an error nothing is written.
+PkmStatus pkm_form_switch(const PkmMachine *machine,
+                          const double *joints,
+                          const PkmRange *travel,
+                          double *end,
+                          PkmPose *pose,
+                          PkmMachine *after,
+                          PkmError *error);
 
 // Chooses the machine of `kinematicsForward` and `kinematicsInverse`; it must outlive their use. NULL chooses none.
 void pkm_use(PkmMachine *machine);

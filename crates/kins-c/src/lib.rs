@@ -100,6 +100,15 @@ pub struct PkmSingularity {
     pub forward: f64,
 }
 
+/// Travel of a joint (mm, degrees), both ends included.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(missing_docs)]
+pub struct PkmRange {
+    pub min: f64,
+    pub max: f64,
+}
+
 /// A text of bounded length for C; what does not fit is left out.
 struct Text<'a> {
     left: core::slice::IterMut<'a, core::ffi::c_char>,
@@ -325,6 +334,17 @@ pub unsafe extern "C" fn pkm_moma_w(
     unsafe { construct(machine, parameters, error, |p| Some(MomaW::new(&p.into()).map(Into::into))) }
 }
 
+/// Makes one mechanism of the HV-Mill with carriage, table and head. `error` may be NULL.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_hv_mill(
+    machine: *mut PkmMachine,
+    parameters: *const PkmHvMill,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { construct(machine, parameters, error, |p| Some(HvMill::new(&p.checked()?).map(Into::into))) }
+}
+
 /// Makes an HV-Mill with both mechanisms. `error` may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pkm_hv_machine(
@@ -429,6 +449,17 @@ pub unsafe extern "C" fn pkm_moma_4s_parameters(parameters: *mut PkmMoma4s, outw
 pub unsafe extern "C" fn pkm_moma_w_parameters(parameters: *mut PkmMomaW) -> PkmStatus {
     // SAFETY: the contract at the head of this file.
     unsafe { give(parameters, Some(PkmMomaW::default())) }
+}
+
+/// Default parameters of one mechanism of the HV-Mill: `'H'` with 3 or 4 axes, `'V'` with 3, 4 or 5. Inferred dimensions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_hv_mill_parameters(
+    parameters: *mut PkmHvMill,
+    spindle: u8,
+    controlled_axes: u8,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe { give(parameters, PkmHvMill::named(spindle, controlled_axes)) }
 }
 
 /// Default parameters of the HV-Mill with head (fig 2b). Inferred dimensions.
@@ -614,6 +645,57 @@ pub unsafe extern "C" fn pkm_switch(
                 make(machine, error, Ok(Mechanism::HvMachine(switched)))
             }
             Err(why) => refuse(error, PkmStatus::Kinematics, why.code(), why),
+        }
+    }
+}
+
+/// O-X glide: the joint move that takes the machine, standing at `joints`, from its form to the other one. Checked: both ends of the
+/// move outside the guard and within `travel` (three: AB, CD, Z; NULL: no limits). `end` may be `joints`. Written: `end`, where to drive the sliders linearly and
+/// together; `pose`, where the platform is before and after; `after`, the machine once the move is done (may be `machine` itself).
+/// Nothing moves, and after an error nothing is written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pkm_form_switch(
+    machine: *const PkmMachine,
+    joints: *const f64,
+    travel: *const PkmRange,
+    end: *mut f64,
+    pose: *mut PkmPose,
+    after: *mut PkmMachine,
+    error: *mut PkmError,
+) -> PkmStatus {
+    // SAFETY: the contract at the head of this file.
+    unsafe {
+        let Some(Mechanism::OxGlide(glide)) = made(machine).map(PkmMachine::mechanism) else {
+            return usage(error);
+        };
+        let glide = *glide;
+        let (Some(now), Some(end), Some(pose), false) = (
+            joints.cast::<Joints>().as_ref().copied(),
+            end.cast::<Joints>().as_mut(),
+            pose.as_mut(),
+            after.is_null(),
+        ) else {
+            return usage(error);
+        };
+        let travel = travel
+            .cast::<[PkmRange; 3]>()
+            .as_ref()
+            .map(|all| all.map(|PkmRange { min, max }| JointRange { min, max }));
+        match glide.form_switch(&now, travel.as_ref().map_or(&[], |all| all.as_slice())) {
+            Ok(switch) => {
+                [end[0], end[1], end[2]] = [switch.joints[0], switch.joints[1], switch.joints[2]];
+                *pose = from_pose(&switch.pose);
+                make(after, error, Ok(Mechanism::OxGlide(switch.machine)))
+            }
+            Err(why) => match why {
+                FormSwitchError::State(state) => refuse(error, PkmStatus::Kinematics, state.code(), why),
+                FormSwitchError::TooNear { .. } => {
+                    refuse(error, PkmStatus::Kinematics, "singular:form_switch", why)
+                }
+                FormSwitchError::Travel(limit) => {
+                    refuse(error, PkmStatus::Kinematics, glide.limit_code(&limit), why)
+                }
+            },
         }
     }
 }

@@ -252,6 +252,61 @@ impl PkmHvMachine {
     }
 }
 
+/// One mechanism of the HV-Mill alone, `spindle` `'H'` or `'V'`; `controlled_axes` 3 (no rotary axis), 4 (table) or 5 (table and
+/// head, V only).
+#[repr(C)]
+#[derive(Clone, Copy)]
+#[allow(missing_docs)]
+pub struct PkmHvMill {
+    pub spindle: u8,
+    pub controlled_axes: u8,
+    pub mechanism: PkmMoma4s,
+    pub cr_mm: [f64; 3],
+    pub w0_mm: [f64; 3],
+    pub table_sense: i8,
+    /// V only.
+    pub has_head: bool,
+    pub head_c_mm: [f64; 3],
+    pub head_sense: i8,
+}
+
+impl PkmHvMill {
+    /// The parameters; `None` if `spindle` is neither `'H'` nor `'V'`.
+    pub(crate) fn checked(&self) -> Option<HvMillParameters> {
+        Some(HvMillParameters {
+            spindle: spindle(self.spindle)?,
+            controlled_axes: self.controlled_axes,
+            mechanism: (&self.mechanism).into(),
+            cr_mm: self.cr_mm,
+            w0_mm: self.w0_mm,
+            table_sense: self.table_sense,
+            head: self
+                .has_head
+                .then_some(HeadParameters { c_mm: self.head_c_mm, head_sense: self.head_sense }),
+        })
+    }
+
+    /// The default dimensions of `'H'` or `'V'` (inferred).
+    pub(crate) fn named(letter: u8, controlled_axes: u8) -> Option<Self> {
+        let p = match spindle(letter)? {
+            Spindle::H => HvMillParameters::h(controlled_axes),
+            Spindle::V => HvMillParameters::v(controlled_axes),
+        };
+        let head = p.head.unwrap_or(HeadParameters { c_mm: [0.0; 3], head_sense: 1 });
+        Some(Self {
+            spindle: letter,
+            controlled_axes,
+            mechanism: p.mechanism.into(),
+            cr_mm: p.cr_mm,
+            w0_mm: p.w0_mm,
+            table_sense: p.table_sense,
+            has_head: p.head.is_some(),
+            head_c_mm: head.c_mm,
+            head_sense: head.head_sense,
+        })
+    }
+}
+
 /// `'H'` or `'V'`.
 pub(crate) fn spindle(letter: u8) -> Option<Spindle> {
     match letter {

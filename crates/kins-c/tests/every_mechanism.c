@@ -97,9 +97,46 @@ int main(void) {
   at.b = 5;
   there_and_back("hv-mill V", &machine, at);
 
+  PkmHvMill alone;
+  check(pkm_hv_mill_parameters(&alone, 'V', 5) == PKM_STATUS_OK, "HV-Mill V parameters");
+  check(pkm_hv_mill_parameters(&alone, 'Q', 5) == PKM_STATUS_USAGE, "no such spindle");
+  check(pkm_hv_mill(&machine, &alone, &error) == PKM_STATUS_OK, "HV-Mill V alone");
+  there_and_back("hv-mill V alone", &machine, (PkmPose){.x = 20, .y = -10, .z = 30, .b = 10, .c = 25});
+  check(pkm_joint_count(&machine) == 5, "V has five joints");
+  check(pkm_hv_mill_parameters(&alone, 'H', 4) == PKM_STATUS_OK && !alone.has_head, "HV-Mill H parameters");
+  check(pkm_hv_mill(&machine, &alone, &error) == PKM_STATUS_OK, "HV-Mill H alone");
+  there_and_back("hv-mill H alone", &machine, (PkmPose){.x = 20, .y = -10, .z = 30, .b = 10});
+  alone.controlled_axes = 5;
+  check(pkm_hv_mill(&machine, &alone, &error) == PKM_STATUS_GEOMETRY, "H has no head");
+  check(strstr(error.message, "controlled_axes") != NULL, error.message);
+
   PkmOxGlide glide = {.l_mm = 80, .s_mm = 20, .form = 'X', .c_min_mm = 2};
   check(pkm_ox_glide(&machine, &glide, &error) == PKM_STATUS_OK, "O-X");
   there_and_back("ox-glide", &machine, (PkmPose){.x = 65, .y = 64, .z = 10});
+
+  /* The form switch: from X to O and back to where it began; refused near c = 0 and at the rails' ends. */
+  PkmMachine open;
+  PkmPose stand = {.x = 65, .y = 64, .z = 10}, there = {0};
+  PkmRange travel[3] = {{0, 130}, {0, 130}, {0, 100}};
+  double crossed[PKM_MAX_JOINTS] = {0}, end[PKM_MAX_JOINTS] = {0}, home[PKM_MAX_JOINTS] = {0};
+  check(pkm_inverse(&machine, &stand, crossed, &error) == PKM_STATUS_OK, "X");
+  check(pkm_form_switch(&machine, crossed, travel, end, &there, &open, &error) == PKM_STATUS_OK, "X to O");
+  check(fabs(end[0] - 7) < 1e-9 && fabs(end[1] - 123) < 1e-9 && end[2] == 10, "c = 48 instead of -48");
+  check(fabs(there.x - 65) < 1e-9 && fabs(there.y - 64) < 1e-9 && there.z == 10, "the platform is where it was");
+  check(pkm_inverse(&open, &stand, home, &error) == PKM_STATUS_OK && fabs(home[0] - end[0]) < 1e-9, "O stands there");
+  check(pkm_form_switch(&open, end, NULL, home, &there, &open, &error) == PKM_STATUS_OK, "O to X, in place");
+  check(fabs(home[0] - crossed[0]) < 1e-9 && fabs(home[1] - crossed[1]) < 1e-9, "X again");
+  check(pkm_form_switch(&open, end, NULL, home, &there, &open, &error) == PKM_STATUS_KINEMATICS, "O's sliders in X");
+  check(strcmp(error.code, "wrong_form") == 0, error.code);
+  travel[0].min = 8;
+  check(pkm_form_switch(&machine, crossed, travel, end, &there, &open, &error) == PKM_STATUS_KINEMATICS, "rail");
+  check(strcmp(error.code, "limit_low:AB") == 0, error.code);
+  stand.y = 79.99;
+  check(pkm_inverse(&machine, &stand, crossed, &error) == PKM_STATUS_OK, "near c = 0");
+  check(pkm_form_switch(&machine, crossed, NULL, end, &there, &open, &error) == PKM_STATUS_KINEMATICS, "guard");
+  check(strcmp(error.code, "singular:form_switch") == 0, error.code);
+  check(pkm_form_switch(NULL, crossed, NULL, end, &there, &open, NULL) == PKM_STATUS_USAGE, "NULL");
+  check(pkm_form_switch(&machine, crossed, NULL, end, &there, NULL, NULL) == PKM_STATUS_USAGE, "NULL");
 
   PkmLambda6 lambda;
   check(pkm_lambda6_parameters(&lambda) == PKM_STATUS_OK, "Lambda parameters");
