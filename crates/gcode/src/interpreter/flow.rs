@@ -284,6 +284,11 @@ impl Interpreter {
         }
         let found = match (skip.until, word.keyword) {
             (Until::Branch, Some(Keyword::Elseif)) => self.test(word)? != 0.0,
+            (Until::Endif, Some(Keyword::Elseif)) => {
+                // LinuxCNC reads the test of every elseif of this label.
+                self.test(word)?;
+                false
+            }
             (Until::Branch, Some(Keyword::Else | Keyword::Endif)) | (Until::Endif, Some(Keyword::Endif)) => {
                 true
             }
