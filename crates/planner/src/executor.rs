@@ -191,22 +191,27 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         }
     }
 
-    /// True when hardest braking from here ends less than two servo periods before the end of what is known.
+    /// True when within two servo periods, at the fastest, the machine would brake for the end of the queue.
     fn brakes_now(&self) -> bool {
-        let rows = self.limits.rows();
-        let mut x = self.executor.x;
-        let margin = 2.0 * sqrt(x) * self.settings.servo_period_s;
-        let mut rest = 0.0;
-        let mut previous: Option<&crate::grid::Node<R>> = None;
+        let (rows, (feed, rapid)) = (self.limits.rows(), self.executor.overrides());
+        let Some(front) = self.nodes.front() else { return false };
         // The interval being driven counts as driven.
-        for node in self.nodes.iter().skip(1) {
-            if let Some(from) = previous {
-                x = if x > 0.0 { exits(&from.right, &node.left, rows, from.length, x).0 } else { 0.0 };
-                rest += if x > 0.0 { 0.0 } else { from.length };
+        let mut x = self.executor.legs.last().map_or(self.executor.x, |leg| leg.x);
+        let here = front.distance + self.executor.sigma;
+        let known = self.nodes.iter().skip(1);
+        for (from, to) in known.zip(self.nodes.iter().skip(2)) {
+            if from.distance > here + 2.0 * sqrt(x) * self.settings.servo_period_s {
+                return false;
             }
-            previous = Some(node);
+            if x >= from.entry {
+                if from.distance > self.grid.settled {
+                    return true;
+                }
+                x = from.entry;
+            }
+            x = exits(&from.right, &to.left, rows, from.length, x).1.min(to.cap(feed, rapid));
         }
-        rest <= margin
+        true
     }
 
     /// Drives along the nodes for `time` seconds, or to the next stop. True at a stop: the machine rests there until the
@@ -263,6 +268,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     fn pass_node(&mut self) {
         self.nodes.pop_front();
+        self.work.passed += 1;
         let Some(front) = self.nodes.front() else { return };
         // The piece before stays: the setpoint of a stop at its end is still on it.
         while self.first_piece < front.piece && self.pieces.len() > 1 {

@@ -18,7 +18,9 @@ const NODES_PER_PERIOD: f64 = 16.0;
 /// The speed is held so low that no more than about twice this many nodes are passed in a servo period.
 const NODES_PER_TICK: usize = 64;
 /// Nodes added in one go: bounds the work of a tick.
-const BATCH: usize = 32;
+const BATCH: usize = NODES_PER_TICK;
+/// Less room than this is not worth a walk.
+const WORTH: usize = 16;
 
 /// A point of the path where the speed is planned; the interval it begins reaches to the next node.
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +44,7 @@ pub(crate) struct Node<const R: usize> {
     pub(crate) left: Rows<R>,
     pub(crate) right: Rows<R>,
     /// Distance along the path since the queue was empty; only differences count.
-    distance: f64,
+    pub(crate) distance: f64,
 }
 
 impl<const R: usize> Node<R> {
@@ -65,11 +67,25 @@ pub(crate) struct Grid<const R: usize> {
     pub(crate) s: f64,
     step: f64,
     last: Option<Sample<R>>,
+    /// Nodes at the end that the look-ahead has not seen.
+    pending: usize,
+    /// Nodes the last look-ahead computed.
+    depth: usize,
+    /// As far as this (the nodes' `distance`) nothing depends on where the queue ends.
+    pub(crate) settled: f64,
 }
 
 impl<const R: usize> Grid<R> {
     pub(crate) fn new() -> Self {
-        Self { piece: 0, s: 0.0, step: f64::INFINITY, last: None }
+        Self {
+            piece: 0,
+            s: 0.0,
+            step: f64::INFINITY,
+            last: None,
+            pending: 0,
+            depth: 0,
+            settled: f64::NEG_INFINITY,
+        }
     }
 }
 
@@ -79,17 +95,25 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         if let Some(fault) = self.fault {
             return Err(fault);
         }
-        let few = self.nodes.len() < BATCH;
-        if !few && self.nodes.len() + BATCH > NODES {
+        if !self.is_short() && self.nodes.len() + WORTH > NODES {
             return Ok(());
         }
-        let known = self.nodes.len();
         let result = self.cut(BATCH);
-        self.look_ahead(known);
+        // What the machine comes to soon must be final. Beyond that a pass waits until it is worth its price.
+        let soon = self.nodes.get(2 * NODES_PER_TICK).or(self.nodes.back()).map_or(0.0, |node| node.distance);
+        let hurry = !(self.grid.settled >= soon);
+        if self.grid.pending > 0 && (hurry || 4 * self.grid.pending >= self.grid.depth) {
+            self.look_ahead(self.nodes.len().saturating_sub(self.grid.pending));
+        }
         if let Err(fault) = result {
             self.fault = Some(fault);
         }
         result
+    }
+
+    /// True when so little is known that a push must not wait for the next tick.
+    pub(crate) fn is_short(&self) -> bool {
+        self.nodes.len() < BATCH
     }
 
     fn cut(&mut self, budget: usize) -> Result<(), PlanError> {
@@ -108,7 +132,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         Ok(())
     }
 
-    fn sample(&self, piece: &Piece, s: f64) -> Result<Sample<R>, PlanError> {
+    fn sample(&mut self, piece: &Piece, s: f64) -> Result<Sample<R>, PlanError> {
+        self.work.samples += 1;
         self.limits.sample(&self.kinematics, &piece.geometry, s, piece.feed, piece.span)
     }
 
@@ -131,8 +156,15 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.grid.s = piece.from;
         self.grid.step = f64::INFINITY;
         self.grid.last = Some(sample);
-        let _ = self.nodes.push_back(node);
+        self.add(node);
         Ok(())
+    }
+
+    fn add(&mut self, node: Node<R>) {
+        // `cut` goes on only while there is room.
+        let _ = self.nodes.push_back(node);
+        self.grid.pending += 1;
+        self.work.nodes += 1;
     }
 
     /// The end of a piece: what begins here joins the last node. False if nothing follows yet.
@@ -165,13 +197,21 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             Some(last) => last,
             None => self.sample(piece, self.grid.s)?,
         };
-        let mut step = even(remaining, (2.0 * self.grid.step).min(remaining));
+        let guess = self.grid.step;
+        let mut step = even(remaining, guess);
         let period = self.settings.servo_period_s;
         let mut sample = self.sample(piece, self.grid.s + step)?;
+        let mut next_guess = guess;
         for _ in 0..60 {
             let scales = last.variation(&sample);
             let shortest = period * sqrt(scales.speed) / NODES_PER_PERIOD;
             if step <= shortest || scales.change <= CHANGE {
+                // What would have been right here is right for the next, or nearly so.
+                next_guess = (step * (0.9 * CHANGE / scales.change).min(4.0)).max(0.75 * shortest);
+                // A short piece says little of what the path could bear; a straight one nothing.
+                if step >= remaining || scales.change == 0.0 {
+                    next_guess = next_guess.max(guess);
+                }
                 break;
             }
             // Change grows about linearly with the step; never below what is needed.
@@ -212,9 +252,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             right: sample.rows,
             distance,
         };
-        let _ = self.nodes.push_back(node);
+        self.add(node);
         self.grid.s = s;
-        self.grid.step = step;
+        self.grid.step = next_guess;
         self.grid.last = Some(sample);
         Ok(())
     }
@@ -226,6 +266,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         if let Some(tail) = self.nodes.back_mut() {
             tail.entry = 0.0;
         }
+        self.grid.pending = 0;
+        self.grid.depth = 0;
+        self.grid.settled = f64::NEG_INFINITY;
         for i in (1..self.nodes.len().saturating_sub(1)).rev() {
             let (Some(node), Some(next)) = (self.nodes.get(i), self.nodes.get(i + 1)) else { return };
             let cap = node.cap(feed, rapid).min(FASTEST);
@@ -234,10 +277,17 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             } else {
                 0.0
             };
+            self.work.planned += 1;
+            self.grid.depth += 1;
             let Some(node) = self.nodes.get_mut(i) else { return };
-            let same = entry == node.entry;
+            let same = entry == node.entry && i + 1 < known;
             node.entry = entry;
-            if same && i + 1 < known {
+            // At its cap a node asks nothing of what follows; and one that a longer queue leaves as it is, no longer
+            // queue will change (the entry is a concave function of the next one).
+            if (same || entry >= cap) && node.distance > self.grid.settled {
+                self.grid.settled = node.distance;
+            }
+            if same {
                 return;
             }
         }

@@ -28,7 +28,7 @@ pub use frame::{Event, Frame};
 pub use jerk::Smoother;
 pub use limits::{AxisLimits, Feed, GUARD, JointLimits, Limits, LimitsError};
 pub use merge::{Chords, MOST_MERGED, Merger};
-pub use planner::{Move, PathMode, Planner, PushError, Setpoint, Settings, State};
+pub use planner::{Move, PathMode, Planner, PushError, Setpoint, Settings, State, Work};
 
 use pkm_canon::Span;
 use pkm_kins::{Axis, InverseError, JointRange, Pose};

@@ -91,6 +91,19 @@ pub struct Setpoint {
     pub state: State,
 }
 
+/// What the planner has done since it was made: its work is bounded in these.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Work {
+    /// Nodes set along the path.
+    pub nodes: u64,
+    /// Places at which the kinematics were asked for them.
+    pub samples: u64,
+    /// Nodes the look-ahead computed an entry for, again or for the first time.
+    pub planned: u64,
+    /// Nodes driven past.
+    pub passed: u64,
+}
+
 /// A move, or a blend between two, cut to what is really driven: s from `from` to `to`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece {
@@ -141,6 +154,7 @@ pub struct Planner<K, const R: usize, const PIECES: usize, const NODES: usize> {
     pub(crate) executor: Executor,
     pub(crate) fault: Option<PlanError>,
     pub(crate) setpoint: Setpoint,
+    pub(crate) work: Work,
     moves: u32,
     end: Vector,
 }
@@ -175,6 +189,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 span: Span::default(),
                 state: State::Idle,
             },
+            work: Work::default(),
             moves: 0,
             end: start.to_array(),
         })
@@ -183,6 +198,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     /// The last setpoint.
     pub fn setpoint(&self) -> &Setpoint {
         &self.setpoint
+    }
+
+    /// What has been done so far.
+    pub fn work(&self) -> Work {
+        self.work
     }
 
     /// The kinematics.
@@ -238,7 +258,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             motion,
             span: next.span,
         });
-        self.refill().map_err(PushError::Plan)?;
+        if self.is_short() {
+            self.refill().map_err(PushError::Plan)?;
+        }
         Ok(motion)
     }
 

@@ -1,19 +1,11 @@
-//! Drives the planner tick by tick and looks at nothing but the joint positions that come out.
+//! Drives the planner tick by tick and looks at nothing but the positions that come out.
 
-use pkm_kins::machine::Mechanism;
-use pkm_kins::{JointRange, Kinematics, Pose};
-use pkm_planner::path::{FeedGroup, Geometry, Vector};
+use crate::catalogue::Case;
+use pkm_kins::{JointRange, Joints, Pose};
+use pkm_planner::path::{Arc, FeedGroup, Geometry, Line, Vector};
 use pkm_planner::{Feed, JointLimits, Limits, Move, PathMode, Planner, PushError, Settings, State};
 
-type TestPlanner = Planner<Mechanism, 6, 1024, 2048>;
-
-pub(crate) struct Case {
-    pub(crate) mechanism: Mechanism,
-    pub(crate) velocity: Vec<f64>,
-    pub(crate) acceleration: Vec<f64>,
-    pub(crate) moves: Vec<(Geometry, PathMode)>,
-    pub(crate) feed_mm_s: f64,
-}
+pub(crate) type TestPlanner = Planner<pkm_kins::machine::Mechanism, 6, 2048, 2048>;
 
 /// The planner with its queues is larger than a test thread's stack.
 pub(crate) fn with_stack(run: impl FnOnce() + Send) {
@@ -23,6 +15,32 @@ pub(crate) fn with_stack(run: impl FnOnce() + Send) {
             std::panic::resume_unwind(panic);
         }
     });
+}
+
+/// The servo period, and how many setpoints are looked at in each.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) struct Sampling {
+    pub(crate) period_s: f64,
+    pub(crate) substeps: u32,
+}
+
+impl Sampling {
+    pub(crate) const SERVO: Self = Self { period_s: 1e-3, substeps: 1 };
+    /// The same motion looked at ten times as often.
+    pub(crate) const TENTH: Self = Self { period_s: 1e-3, substeps: 10 };
+    /// Planned at ten times the rate.
+    #[allow(dead_code, reason = "the bench compares one plan at two samplings only")]
+    pub(crate) const FAST: Self = Self { period_s: 1e-4, substeps: 1 };
+
+    pub(crate) fn step_s(self) -> f64 {
+        self.period_s / f64::from(self.substeps)
+    }
+
+    /// Rounding of a second difference of positions of some 300 mm, in shares of the limits here.
+    #[allow(dead_code, reason = "the bench prints and does not judge")]
+    pub(crate) fn slack(self) -> f64 {
+        if self.step_s() < 0.5e-3 { 1e-5 } else { 1e-6 }
+    }
 }
 
 /// What happens during a run, by tick.
@@ -38,7 +56,40 @@ pub(crate) struct Trace {
     /// Worst joint velocity and acceleration, in shares of the limit.
     pub(crate) velocity: f64,
     pub(crate) acceleration: f64,
+    /// Largest distance from the given geometry, mm (and rad).
+    pub(crate) path_error_mm: f64,
     pub(crate) end: Vector,
+}
+
+/// First and second differences of joint positions, worst shares of the limits.
+pub(crate) struct Differences<'a> {
+    case: &'a Case,
+    step_s: f64,
+    rows: [Joints; 2],
+    pub(crate) velocity: f64,
+    pub(crate) acceleration: f64,
+}
+
+impl<'a> Differences<'a> {
+    /// At rest at `start`.
+    pub(crate) fn new(case: &'a Case, step_s: f64, start: Joints) -> Self {
+        Self { case, step_s, rows: [start; 2], velocity: 0.0, acceleration: 0.0 }
+    }
+
+    pub(crate) fn push(&mut self, now: Joints) {
+        let [before, last] = self.rows;
+        for (j, ((a, b), c)) in before.iter().zip(last).zip(now).enumerate() {
+            if j >= self.case.velocity.len() {
+                break;
+            }
+            assert!(c.is_finite(), "joint {j}: {c}");
+            let velocity = (c - b) / self.step_s;
+            let acceleration = (c - 2.0 * b + a) / (self.step_s * self.step_s);
+            self.velocity = self.velocity.max(velocity.abs() / self.case.velocity[j]);
+            self.acceleration = self.acceleration.max(acceleration.abs() / self.case.acceleration[j]);
+        }
+        self.rows = [last, now];
+    }
 }
 
 pub(crate) fn random(state: &mut u64) -> u64 {
@@ -48,36 +99,44 @@ pub(crate) fn random(state: &mut u64) -> u64 {
     *state
 }
 
-pub(crate) fn drive(case: &Case, period_s: f64, disturbance: Disturbance, one_per_tick: bool) -> Trace {
-    let joint_limits: Vec<JointLimits> = (0..case.velocity.len())
-        .map(|i| JointLimits {
-            range: JointRange { min: -1000.0, max: 1000.0 },
-            max_velocity: case.velocity[i],
-            max_acceleration: case.acceleration[i],
-        })
-        .collect();
-    let start = Pose::from_array(case.moves[0].0.at(0.0).position);
-    let limits = Limits::new(&joint_limits, &[], 0.0).unwrap();
-    let settings = Settings { servo_period_s: period_s, substeps: 1, settle_periods: 0 };
-    let mut planner = TestPlanner::new(case.mechanism, limits, settings, start).unwrap();
-    let n = case.mechanism.joint_count();
-    let mut rows = vec![planner.setpoint().joints; 3];
+pub(crate) fn limits<const R: usize>(case: &Case) -> Limits<R> {
+    let joints = case.velocity.iter().zip(&case.acceleration).map(|(&max_velocity, &max_acceleration)| {
+        JointLimits { range: JointRange { min: -1000.0, max: 1000.0 }, max_velocity, max_acceleration }
+    });
+    Limits::new(&joints.collect::<Vec<_>>(), &[], 0.0).unwrap()
+}
+
+pub(crate) fn start(case: &Case) -> Pose {
+    Pose::from_array(case.moves[0].0.at(0.0).position)
+}
+
+pub(crate) fn to_move(case: &Case, (geometry, mode): (Geometry, PathMode)) -> Move {
+    Move {
+        geometry,
+        feed: Feed { speed: case.feed_mm_s, group: FeedGroup::Xyz },
+        rapid: case.feed_mm_s.is_infinite(),
+        mode,
+        span: Default::default(),
+    }
+}
+
+pub(crate) fn planner(case: &Case, sampling: Sampling) -> TestPlanner {
+    let settings =
+        Settings { servo_period_s: sampling.period_s, substeps: sampling.substeps, settle_periods: 0 };
+    TestPlanner::new(case.mechanism, limits(case), settings, start(case)).unwrap()
+}
+
+pub(crate) fn drive(case: &Case, sampling: Sampling, disturbance: Disturbance, one_per_tick: bool) -> Trace {
+    let mut planner = planner(case, sampling);
+    let mut differences = Differences::new(case, sampling.step_s(), planner.setpoint().joints);
     let mut queue = case.moves.iter();
     let mut next = queue.next();
-    let (mut ticks, mut velocity, mut acceleration) = (0u64, 0.0_f64, 0.0_f64);
+    let (mut ticks, mut path_error_mm) = (0u64, 0.0_f64);
     let mut seed = 0x9e37_79b9_7f4a_7c15;
-    let per_ms = (1e-3 / period_s).round() as u64;
+    let per_ms = (1e-3 / sampling.step_s()).round() as u64;
     loop {
-        while let Some((geometry, mode)) = next {
-            let feed = Feed { speed: case.feed_mm_s, group: FeedGroup::Xyz };
-            let step = Move {
-                geometry: *geometry,
-                feed,
-                rapid: case.feed_mm_s.is_infinite(),
-                mode: *mode,
-                span: Default::default(),
-            };
-            match planner.push(step) {
+        while let Some(piece) = next {
+            match planner.push(to_move(case, *piece)) {
                 Ok(_) => next = queue.next(),
                 Err(PushError::Full) => break,
                 Err(PushError::Plan(e)) => panic!("{e:?}"),
@@ -101,23 +160,57 @@ pub(crate) fn drive(case: &Case, period_s: f64, disturbance: Disturbance, one_pe
         }
         let setpoint = planner.tick().unwrap();
         ticks += 1;
-        rows.push(setpoint.joints);
-        let k = rows.len();
-        let (before, last, now) = (rows[k - 3], rows[k - 2], rows[k - 1]);
-        for (j, ((a, b), c)) in before.iter().zip(last).zip(now).enumerate().take(n) {
-            velocity = velocity.max(((c - b) / period_s).abs() / case.velocity[j]);
-            acceleration =
-                acceleration.max(((c - 2.0 * b + a) / (period_s * period_s)).abs() / case.acceleration[j]);
-        }
+        differences.push(setpoint.joints);
+        path_error_mm =
+            path_error_mm.max(off_path(case, setpoint.motion as usize, &setpoint.pose.to_array()));
         if setpoint.state == State::Idle && next.is_none() {
             break;
         }
         assert!(ticks < 1_000_000, "stalls: {setpoint:?}\n{planner:?}");
     }
     Trace {
-        duration_s: (ticks - 1) as f64 * period_s,
-        velocity,
-        acceleration,
+        duration_s: (ticks - 1) as f64 * sampling.step_s(),
+        velocity: differences.velocity,
+        acceleration: differences.acceleration,
+        path_error_mm,
         end: planner.setpoint().pose.to_array(),
     }
+}
+
+/// Distance of a place on move `motion`, or on the blend after it, from what was given.
+pub(crate) fn off_path(case: &Case, motion: usize, pose: &Vector) -> f64 {
+    let near = case.moves.iter().skip(motion).take(2);
+    near.map(|(geometry, _)| distance(geometry, pose)).fold(f64::INFINITY, f64::min)
+}
+
+fn distance(geometry: &Geometry, pose: &Vector) -> f64 {
+    match geometry {
+        Geometry::Line(line) => from_line(line, pose),
+        Geometry::Arc(arc) => from_circle(arc, pose),
+        _ => panic!("no such move in these tests"),
+    }
+}
+
+fn norm(v: &Vector) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn from_line(line: &Line, pose: &Vector) -> f64 {
+    let off: Vector = std::array::from_fn(|i| pose[i] - line.start[i]);
+    let dot: f64 = off.iter().zip(&line.direction).map(|(o, d)| o * d).sum();
+    let s = (dot / norm(&line.direction) / norm(&line.direction)).clamp(0.0, line.length);
+    norm(&std::array::from_fn(|i| off[i] - s * line.direction[i]))
+}
+
+fn from_circle(arc: &Arc, pose: &Vector) -> f64 {
+    assert!(arc.radius_rate.abs() < 1e-9 && norm(&arc.rate) < 1e-9, "a helix or spiral");
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let from_centre = [0, 1, 2].map(|i| pose[i] - arc.base[i]);
+    let (x, y) = (dot(from_centre, arc.u), dot(from_centre, arc.v));
+    let height: Vector = std::array::from_fn(|i| match i {
+        0..3 => from_centre[i] - x * arc.u[i] - y * arc.v[i],
+        _ => pose[i] - arc.base[i],
+    });
+    norm(&std::array::from_fn(|i| if i == 0 { (x * x + y * y).sqrt() - arc.radius_mm } else { 0.0 }))
+        .max(norm(&height))
 }

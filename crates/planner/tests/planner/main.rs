@@ -2,5 +2,6 @@
 #![allow(clippy::print_stdout)]
 
 mod cases;
+mod catalogue;
 mod harness;
 mod random;

@@ -1,8 +1,8 @@
 //! Random paths that prefer trouble: reversals, tiny blocks, repeated points, arcs into lines, every path mode, extreme
 //! tolerances. Whatever the path, no joint exceeds its limits at any tick, the machine arrives, and it never stalls.
 
-use crate::cases::{identity, moma, xyz};
-use crate::harness::{Case, Disturbance, drive, random, with_stack};
+use crate::catalogue::{Case, identity, moma, xyz};
+use crate::harness::{Disturbance, Sampling, drive, random, with_stack};
 use pkm_kins::Axis;
 use pkm_planner::PathMode;
 use pkm_planner::path::{Arc, Geometry, Line, Tolerance, Vector};
@@ -78,7 +78,7 @@ fn hold(mut make: impl FnMut(&mut u64) -> Case + Send) {
                 1 => Disturbance::HoldThirds,
                 _ => Disturbance::None,
             };
-            let trace = drive(&case, 1e-3, disturbance, number.is_multiple_of(5));
+            let trace = drive(&case, Sampling::SERVO, disturbance, number.is_multiple_of(5));
             let goal = case.moves.last().expect("not empty").0;
             let goal = goal.at(goal.length()).position;
             let ends_there = trace.end.iter().zip(goal).all(|(got, want)| (got - want).abs() < 1e-9);
