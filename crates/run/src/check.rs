@@ -5,14 +5,16 @@
 
 use crate::feeder::{Events, face, frame, interpreter};
 use crate::program::Program;
+use crate::switch::switched;
 use crate::{Options, messages};
 use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_gcode::Status;
-use pkm_kins::{JointRange, Kinematics, Pose};
+use pkm_kins::machine::Mechanism;
+use pkm_kins::{JointRange, Joints, Kinematics, Pose};
 use pkm_machine::Machine;
 use pkm_planner::path::Geometry;
-use pkm_planner::{Event, Move, PlanError, PlanErrorKind};
+use pkm_planner::{Event, Frame, Move, PlanError, PlanErrorKind};
 use std::collections::VecDeque;
 
 /// Distance between samples, mm (or rad where only angles move), and the most samples a move gets.
@@ -54,7 +56,9 @@ impl Checked {
 pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<Checked, Diagnostic> {
     let start = options.start.unwrap_or(machine.home);
     let mut checked = Checked::default();
-    if let Err(kind) = pose_ok(machine, &start) {
+    let mut mechanism = machine.mechanism;
+    let at_start = mechanism.inverse(&start).map_err(PlanErrorKind::Unreachable);
+    if let Err(kind) = at_start.and_then(|joints| travel(machine, &start, &joints)) {
         let error = PlanError { kind, span: Span::default(), pose: start };
         checked.add(program, messages::plan(program, machine, &error));
     }
@@ -67,26 +71,38 @@ pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<
         match interpreter.step(&mut *source, &mut sink) {
             Ok(status) => {
                 checked.blocks += 1;
-                if status == Status::Synch {
-                    interpreter.set_machine_position_mm(face(frame.position()));
-                }
                 while let Some((event, span)) = queue.pop_front() {
                     match event {
                         Event::Move(step) => {
                             checked.moves += 1;
-                            check_move(program, machine, &step, span, &mut checked);
+                            check_move(program, machine, &mechanism, &step, span, &mut checked);
                         }
                         Event::Unsupported(what) => {
                             checked.add(program, messages::unsupported(program, span, what));
                         }
-                        Event::MachineCode(_) => {
-                            checked.add(program, messages::unsupported(program, span, "a code of the machine's own"));
+                        Event::MachineCode(number) => {
+                            let code = (number, span);
+                            let switch = check_switch(
+                                program,
+                                machine,
+                                &mut mechanism,
+                                code,
+                                &mut frame,
+                                &mut checked,
+                            );
+                            if let Err(finding) = switch {
+                                checked.add(program, finding);
+                                checked.add(program, messages::not_checked_further(program, span));
+                                return Ok(checked);
+                            }
                         }
                         Event::Dwell { .. } | Event::Stop => {}
                     }
                 }
-                if status == Status::Ended {
-                    return Ok(checked);
+                match status {
+                    Status::Running => {}
+                    Status::Synch => interpreter.set_machine_position_mm(face(frame.position())),
+                    Status::Ended => return Ok(checked),
                 }
             }
             Err(error) => {
@@ -100,9 +116,32 @@ pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<
     }
 }
 
-fn pose_ok(machine: &Machine, pose: &Pose) -> Result<(), PlanErrorKind> {
-    let joints = machine.mechanism.inverse(pose).map_err(PlanErrorKind::Unreachable)?;
-    for (joint, (limits, &value)) in machine.joints.iter().zip(&joints).enumerate() {
+/// A switch without motion.
+fn check_switch(
+    program: &Program,
+    machine: &Machine,
+    mechanism: &mut Mechanism,
+    code: (i32, Span),
+    frame: &mut Frame,
+    checked: &mut Checked,
+) -> Result<(), Diagnostic> {
+    let pose = Pose::from_array(*frame.position());
+    let joints = mechanism.inverse(&pose).map_err(|error| {
+        let kind = PlanErrorKind::Unreachable(error);
+        messages::plan(program, machine, &PlanError { kind, span: code.1, pose })
+    })?;
+    let after = switched(program, machine, mechanism, code, &joints, &pose)?;
+    if after.joints != joints {
+        checked.add(program, messages::form_switch(program, code.1));
+    }
+    *mechanism = after.mechanism;
+    frame.set_position(after.pose.to_array());
+    Ok(())
+}
+
+/// Travel of joints and axes.
+fn travel(machine: &Machine, pose: &Pose, joints: &Joints) -> Result<(), PlanErrorKind> {
+    for (joint, (limits, &value)) in machine.joints.iter().zip(joints).enumerate() {
         let range = limits.range;
         if !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE) {
             return Err(PlanErrorKind::JointTravel { joint, value, range });
@@ -136,7 +175,14 @@ fn excess(kind: &PlanErrorKind, known: &PlanErrorKind) -> f64 {
 }
 
 /// Samples one move from end to end; the worst place of the first kind of trouble is the block's finding.
-fn check_move(program: &Program, machine: &Machine, step: &Move, span: Span, checked: &mut Checked) {
+fn check_move(
+    program: &Program,
+    machine: &Machine,
+    mechanism: &Mechanism,
+    step: &Move,
+    span: Span,
+    checked: &mut Checked,
+) {
     if !step.rapid && !(step.feed.speed > 0.0) {
         checked.add(program, messages::feed_unset(program, span));
     }
@@ -147,14 +193,17 @@ fn check_move(program: &Program, machine: &Machine, step: &Move, span: Span, che
     let mut worst: Option<(PlanErrorKind, Pose)> = None;
     for k in 0..=count {
         let s = if k == count { length } else { length * f64::from(k) / f64::from(count) };
-        let pose = Pose::from_array(step.geometry.at(s).position);
-        if let Err(kind) = pose_ok(machine, &pose) {
+        let point = step.geometry.at(s);
+        let [pose, first, second] = [point.position, point.first, point.second].map(Pose::from_array);
+        // Not the place alone: an axis may be locked, a form switch too near to be passed.
+        let motion = mechanism.motion(&pose, &first, &second).map_err(PlanErrorKind::Unreachable);
+        if let Err(kind) = motion.and_then(|motion| travel(machine, &pose, &motion.position)) {
             if worst.as_ref().is_none_or(|(known, _)| excess(&kind, known) > 0.0) {
                 worst = Some((kind, pose));
             }
             continue;
         }
-        let Ok(measure) = machine.mechanism.singularity(&pose) else { continue };
+        let Ok(measure) = mechanism.singularity(&pose) else { continue };
         let value = measure.inverse.min(measure.forward);
         if !(value >= machine.singularity.guard) {
             worst.get_or_insert((

@@ -16,6 +16,11 @@ impl Programmed {
         self.moves.push_back((motion, geometry));
     }
 
+    /// The machine goes on elsewhere: nothing programmed so far is near.
+    pub(crate) fn clear(&mut self) {
+        self.moves.clear();
+    }
+
     /// Distance (mm; the larger of XYZ and UVW) of a pose from the path, while the planner is on move `motion`,
     /// at `s` of it, or on the blend after it.
     pub(crate) fn distance_mm(&mut self, motion: u32, s: f64, blending: bool, pose: &Vector) -> Option<f64> {

@@ -4,14 +4,15 @@
 
 use crate::deviation::Programmed;
 use crate::program::Program;
+use crate::switch::{FormSwitchDrive, switched};
 use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::{Canon, CanonSink, Span};
-use pkm_gcode::{Interpreter, LineSource, Settings, Status};
+use pkm_gcode::{Interpreter, LineSource, MachineCodes, Settings, Status};
 use pkm_hal_sim::{Setpoint, SetpointSource};
 use pkm_kins::machine::Mechanism;
-use pkm_kins::{Kinematics, Pose, maths};
-use pkm_machine::Machine;
+use pkm_kins::{Joints, Kinematics, Pose, maths};
+use pkm_machine::{Machine, Switched};
 use pkm_planner::path::{Tolerance, Vector, feed_length};
 use pkm_planner::{AxisLimits, Event, Frame, JointLimits, Limits, Planner, PushError, Smoother, State};
 use std::collections::VecDeque;
@@ -28,7 +29,10 @@ const BLEND_RAD: f64 = 0.01 / 180.0 * maths::PI;
 
 /// What the interpreter needs to know of a machine.
 pub(crate) fn interpreter(machine: &Machine, options: &Options, start: &Pose) -> Interpreter {
+    let codes: Vec<i32> = machine.switches.iter().map(|switch| switch.code).collect();
     let settings = Settings {
+        // A machine has no more codes than the interpreter takes.
+        machine_codes: MachineCodes::new(&codes).unwrap_or_default(),
         axes: machine.mechanism.axes(),
         block_delete: options.block_delete,
         ..Settings::default()
@@ -86,6 +90,16 @@ pub(crate) struct Feeder<'a> {
     source: Box<dyn LineSource + 'a>,
     frame: Frame,
     planner: Box<HostPlanner>,
+    /// The mechanism in force: of the machine file until a program switches.
+    mechanism: Mechanism,
+    /// A code of the machine's own that waits for everything before it to be driven.
+    code: Option<(i32, Span)>,
+    form_switch: Option<FormSwitchDrive>,
+    /// The interpreter waits to be told where the machine stands.
+    synch: bool,
+    substeps: u32,
+    /// Setpoints given so far.
+    given: u64,
     smoother: Option<Box<Smoother<SMOOTHER>>>,
     /// Setpoints not yet reached by the average, oldest first: it is half a window late.
     late: VecDeque<pkm_planner::Setpoint>,
@@ -150,6 +164,12 @@ impl<'a> Feeder<'a> {
             source,
             frame: frame(machine, &start),
             planner,
+            mechanism: machine.mechanism,
+            code: None,
+            form_switch: None,
+            synch: false,
+            substeps: settings.substeps,
+            given: 0,
             smoother,
             late: VecDeque::new(),
             delay: window / 2,
@@ -171,7 +191,18 @@ impl<'a> Feeder<'a> {
     /// Everything driven and at rest.
     pub(crate) fn is_done(&mut self) -> bool {
         self.fill();
-        self.program_ended && self.queue.is_empty() && self.planner.is_idle()
+        let waits = self.code.is_some() || self.form_switch.is_some();
+        self.program_ended && self.queue.is_empty() && !waits && self.planner.is_idle()
+    }
+
+    /// The mechanism in force.
+    pub(crate) fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    /// True during a form switch: no path is programmed then.
+    pub(crate) fn is_switching(&self) -> bool {
+        self.form_switch.is_some()
     }
 
     pub(crate) fn failure(&self) -> Option<&Diagnostic> {
@@ -180,7 +211,7 @@ impl<'a> Feeder<'a> {
 
     /// Line being executed.
     pub(crate) fn line(&self) -> u32 {
-        self.planner.setpoint().span.line
+        self.form_switch.as_ref().map_or(self.planner.setpoint().span, |switch| switch.span).line
     }
 
     /// The setpoint given last.
@@ -190,14 +221,25 @@ impl<'a> Feeder<'a> {
 
     /// Interprets as far ahead as the planner has room.
     fn fill(&mut self) {
-        while self.planner.has_room() {
-            if let Some((event, span)) = self.queue.pop_front() {
+        while self.planner.has_room() && self.form_switch.is_none() {
+            if let Some(code) = self.code {
+                if !self.planner.is_idle() || !self.given.is_multiple_of(self.substeps.into()) {
+                    return;
+                }
+                self.code = None;
+                if let Err(failure) = self.switch(code) {
+                    self.fail(failure);
+                }
+            } else if let Some((event, span)) = self.queue.pop_front() {
                 if let Err(failure) = self.take(event, span) {
                     self.fail(failure);
                 }
             } else if self.program_ended {
                 self.planner.finish();
                 return;
+            } else if self.synch {
+                self.synch = false;
+                self.interpreter.set_machine_position_mm(face(self.frame.position()));
             } else {
                 self.step();
             }
@@ -210,9 +252,7 @@ impl<'a> Feeder<'a> {
             Ok(status) => {
                 self.blocks += 1;
                 self.program_ended = status == Status::Ended;
-                if status == Status::Synch {
-                    self.interpreter.set_machine_position_mm(face(self.frame.position()));
-                }
+                self.synch = status == Status::Synch;
             }
             Err(error) => {
                 let failure = error.to_diagnostic(&self.program.name(), self.interpreter.source_line());
@@ -225,13 +265,59 @@ impl<'a> Feeder<'a> {
         self.failure.get_or_insert(failure);
         self.program_ended = true;
         self.queue.clear();
+        self.code = None;
+    }
+
+    /// At rest, at the beginning of a servo period: does what a code of the machine's own asks for.
+    fn switch(&mut self, code: (i32, Span)) -> Result<(), Diagnostic> {
+        let joints = self.planner.setpoint().joints;
+        let pose = Pose::from_array(*self.frame.position());
+        let after = switched(self.program, self.machine, &self.mechanism, code, &joints, &pose)?;
+        if after.joints == joints {
+            return self.arrive(&after, code.1);
+        }
+        let settle = self.machine.path.smoothing_periods;
+        self.form_switch =
+            Some(FormSwitchDrive::new(self.machine, &joints, after, code.1, self.substeps, settle));
+        Ok(())
+    }
+
+    /// The machine stands at the end of a switch.
+    fn arrive(&mut self, after: &Switched, span: Span) -> Result<(), Diagnostic> {
+        self.planner.switch(after.mechanism, after.pose, span).map_err(|error| match error {
+            PushError::Plan(error) => messages::plan(self.program, self.machine, &error),
+            PushError::Full => messages::host(self.program, "a switch while the machine moves"),
+        })?;
+        self.mechanism = after.mechanism;
+        self.frame.set_position(after.pose.to_array());
+        self.programmed.clear();
+        Ok(())
+    }
+
+    /// The planned setpoint, or that of a form switch. The planner keeps step with the servo periods in either case.
+    fn planned(&mut self) -> Result<pkm_planner::Setpoint, Diagnostic> {
+        let planned =
+            self.planner.tick().map_err(|error| messages::plan(self.program, self.machine, &error))?;
+        self.given += 1;
+        let Some(drive) = &mut self.form_switch else { return Ok(planned) };
+        Ok(drive.next(&self.mechanism, &planned))
+    }
+
+    /// The pose of averaged joints. Near a singularity they may have none; the planned one is shown then.
+    fn pose_of(&self, joints: &Joints, planned: &Pose) -> Pose {
+        match &self.form_switch {
+            Some(drive) => drive.pose(&self.mechanism, joints),
+            None => self.mechanism.forward(joints, &self.setpoint.pose).unwrap_or(*planned),
+        }
     }
 
     fn take(&mut self, event: Event, span: Span) -> Result<(), Diagnostic> {
         let pushed = match event {
             Event::Unsupported(what) => return Err(messages::unsupported(self.program, span, what)),
-            Event::MachineCode(_) => {
-                return Err(messages::unsupported(self.program, span, "a code of the machine's own"));
+            Event::MachineCode(number) => {
+                self.planner.finish();
+                self.code = Some((number, span));
+                return Ok(());
             }
             Event::Stop => {
                 self.planner.finish();
@@ -260,18 +346,14 @@ impl SetpointSource for Feeder<'_> {
 
     fn next(&mut self, _tick: u64) -> Result<Setpoint, FeederError> {
         self.fill();
-        let mut setpoint = self
-            .planner
-            .tick()
-            .map_err(|e| FeederError(Box::new(messages::plan(self.program, self.machine, &e))))?;
+        let mut setpoint = self.planned().map_err(|failure| FeederError(Box::new(failure)))?;
         if let Some(fault) = self.planner.fault().copied() {
             let failure = messages::plan(self.program, self.machine, &fault);
             self.fail(failure);
         }
         if let Some(smoother) = &mut self.smoother {
             let (joints, joint_velocity) = smoother.push(&setpoint.joints, &setpoint.joint_velocity);
-            // Near a singularity the averaged joints may have no pose; the planned one is shown then.
-            let pose = self.machine.mechanism.forward(&joints, &self.setpoint.pose).unwrap_or(setpoint.pose);
+            let pose = self.pose_of(&joints, &setpoint.pose);
             self.late.push_back(setpoint);
             // The place on the path is that of the setpoint in the middle of the window.
             let middle = match self.late.len() {
@@ -282,6 +364,11 @@ impl SetpointSource for Feeder<'_> {
                 pkm_planner::Setpoint { joints, joint_velocity, pose, state: setpoint.state, ..middle };
         }
         self.setpoint = setpoint;
+        if let Some(drive) = self.form_switch.take_if(|drive| drive.is_over())
+            && let Err(failure) = self.arrive(&drive.after, drive.span)
+        {
+            self.fail(failure);
+        }
         Ok(Setpoint {
             pose: setpoint.pose,
             joints: setpoint.joints,

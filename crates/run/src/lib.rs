@@ -11,6 +11,7 @@ mod messages;
 mod plan;
 mod program;
 mod summary;
+mod switch;
 
 pub use check::{Checked, check};
 pub use plan::{BlockPlan, Plan, Shares, plan};

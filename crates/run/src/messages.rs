@@ -4,8 +4,8 @@ use crate::program::Program;
 use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_hal_sim::Fault;
-use pkm_kins::{Kinematics, Pose, maths};
-use pkm_machine::Machine;
+use pkm_kins::{InverseError, Kinematics, Pose, maths};
+use pkm_machine::{Machine, Refusal, SwitchTarget};
 use pkm_planner::{PlanError, PlanErrorKind};
 use std::io;
 
@@ -92,14 +92,18 @@ pub(crate) fn plan(program: &Program, machine: &Machine, error: &PlanError) -> D
         }
         PlanErrorKind::Unreachable(inner) => {
             let message = format!("{place} cannot be reached: {inner}");
-            at(
-                program,
-                error.span,
-                &inner.code().to_string(),
-                Severity::Error,
-                message,
-                "move the part into the workspace (`pkm workspace` draws it), or choose another configuration",
-            )
+            let help = match inner {
+                InverseError::AxisLocked { .. } if !machine.switches.is_empty() => {
+                    "make the mechanism that this axis belongs to the active one first, by its M code"
+                }
+                InverseError::FormSwitch { .. } => {
+                    "no move may pass here: keep further away, or switch the form by its M code"
+                }
+                _ => {
+                    "move the part into the workspace (`pkm workspace` draws it), or choose another configuration"
+                }
+            };
+            at(program, error.span, &inner.code().to_string(), Severity::Error, message, help)
         }
         _ => at(
             program,
@@ -179,6 +183,43 @@ pub(crate) fn unsupported(program: &Program, span: Span, what: &str) -> Diagnost
         message,
         "take it out to run the rest; `pkm canon` interprets it",
     )
+}
+
+/// A switch that the mechanism refuses.
+pub(crate) fn switch(
+    program: &Program,
+    span: Span,
+    code: i32,
+    to: SwitchTarget,
+    refusal: &Refusal,
+) -> Diagnostic {
+    let message = format!("M{code} cannot switch to {to}: {}", refusal.message);
+    let help = match to {
+        SwitchTarget::Form(_) => "move away from the rails' ends and from the form switch first",
+        SwitchTarget::Mechanism(_) => {
+            "move to another pose first, or correct where the idle mechanism rests (machine file)"
+        }
+    };
+    at(program, span, &refusal.code, Severity::Error, message, help)
+}
+
+/// What a form switch means.
+pub(crate) fn form_switch(program: &Program, span: Span) -> Diagnostic {
+    let message = "on the way to the other form the platform passes c = 0, where it is not held".to_owned();
+    at(
+        program,
+        span,
+        "form-switch",
+        Severity::Note,
+        message,
+        "its inertia or an external stop must carry it through; nothing may touch it",
+    )
+}
+
+/// The check ends here.
+pub(crate) fn not_checked_further(program: &Program, span: Span) -> Diagnostic {
+    let message = "what follows is not checked: it depends on where this switch leads".to_owned();
+    at(program, span, "not-checked", Severity::Note, message, "mend this block and check again")
 }
 
 pub(crate) fn too_many(program: &Program, kept: usize) -> Diagnostic {

@@ -5,6 +5,7 @@ use crate::feeder::Feeder;
 use crate::program::Program;
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_hal_sim::Simulation;
+use pkm_kins::machine::Mechanism;
 use pkm_kins::maths::sqrt;
 use pkm_kins::{Joints, Kinematics, MAX_JOINTS, Pose};
 use pkm_machine::Machine;
@@ -75,7 +76,8 @@ pub struct Summary {
     pub max_step_error_steps: f64,
     /// The same just before and after each edge (timer resolution included).
     pub max_edge_error_steps: f64,
-    /// Smallest singularity measure on the way.
+    /// Smallest singularity measure on the way. This, the deviation and the reach are those of programmed paths; a form
+    /// switch, which passes a singularity on purpose, does not count.
     pub min_singularity_distance: f64,
     /// Where that was.
     pub closest_approach: ClosestApproach,
@@ -189,7 +191,10 @@ impl<'a> Account<'a> {
             self.first_motion.get_or_insert(self.ticks - 1);
             self.last_motion = self.ticks;
         }
-        let mechanism = &self.machine.mechanism;
+        if feeder.is_switching() {
+            return;
+        }
+        let mechanism = *feeder.mechanism();
         if let Ok(measure) = mechanism.singularity(&setpoint.pose) {
             let value = measure.inverse.min(measure.forward);
             if value < self.singularity {
@@ -197,7 +202,7 @@ impl<'a> Account<'a> {
                 self.closest = (setpoint.span.line, measure.inverse_joint);
             }
         }
-        if let Ok(executed) = simulation.feedback_pose(mechanism)
+        if let Ok(executed) = simulation.feedback_pose(&mechanism)
             && let Some(distance) = feeder.programmed.distance_mm(
                 setpoint.motion,
                 setpoint.s,
@@ -208,8 +213,8 @@ impl<'a> Account<'a> {
             self.deviation_mm = self.deviation_mm.max(distance);
         }
         if self.ticks % REACH_EVERY == 1 {
-            self.reach_mm =
-                self.reach_mm.max(half_step_reach_mm(self.machine, &setpoint.pose, &setpoint.joints));
+            let reach_mm = half_step_reach_mm(self.machine, &mechanism, &setpoint.pose, &setpoint.joints);
+            self.reach_mm = self.reach_mm.max(reach_mm);
         }
     }
 
@@ -264,7 +269,7 @@ impl<'a> Account<'a> {
 }
 
 /// How far the tool can be from its place when every joint is half a step away from its own.
-fn half_step_reach_mm(machine: &Machine, pose: &Pose, joints: &Joints) -> f64 {
+fn half_step_reach_mm(machine: &Machine, mechanism: &Mechanism, pose: &Pose, joints: &Joints) -> f64 {
     let n = machine.joints.len().min(MAX_JOINTS);
     let mut farthest = 0.0_f64;
     for corner in 0..1_u32 << n {
@@ -273,7 +278,7 @@ fn half_step_reach_mm(machine: &Machine, pose: &Pose, joints: &Joints) -> f64 {
             let half = 0.5 / joint.steps_per_unit;
             *q += if corner & (1 << j) == 0 { half } else { -half };
         }
-        if let Ok(there) = machine.mechanism.forward(&moved, pose) {
+        if let Ok(there) = mechanism.forward(&moved, pose) {
             let (a, b) = (there.to_array(), pose.to_array());
             let norm = |from: usize| {
                 let d = |i: usize| a[from + i] - b[from + i];
