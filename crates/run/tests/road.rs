@@ -121,3 +121,13 @@ fn moulding_on_moma_w() {
 fn arcs_on_moma_a() {
     holds("moma-arcs.ngc", "moma-a", 0.01);
 }
+
+#[test]
+fn both_mechanisms_of_the_hv_mill() {
+    holds("hv-mill-both.ngc", "hv-mill-7", 0.02);
+}
+
+#[test]
+fn both_forms_of_the_ox_glide() {
+    holds("ox-glide-forms.ngc", "ox-glide-o", 0.02);
+}
