@@ -2,8 +2,7 @@
 //!
 //! Follow the order of every mechanism in `src/`: header, parameters as written, validated type, inverse, forward, Jacobian.
 //! Implement [`Kinematics`] and everything else (planner, simulated HAL, command line) works with it. To ship it, move the
-//! file to `src/`, add one line to `mechanisms!` in `src/machine.rs`, one case to `tests/common/zoo.rs`, and one row to
-//! `tests/budget.rs`: the properties, the budget and the no-panic proof then cover it.
+//! file to `src/`; `docs/add-a-mechanism.md` names every other place.
 //!
 //! Frame: X Y in mm, origin on the turntable's axis. Joints: 1 = arm (mm), 2 = turntable (rad).
 //! Inverse: r = √(x² + y²), φ = atan2(y, x). Forward: x = r cos φ, y = r sin φ.

@@ -2,6 +2,9 @@
 //!
 //! `no_std`, no allocation, no panic, no time and no files. One file per mechanism, the same order in each:
 //! header → parameters as written → validated type → inverse → forward → Jacobian → tests.
+//!
+//! The manual is `docs/kinematics.md`: every mechanism with its joints, parameters, error codes, accuracy and speed. To add your own
+//! mechanism, see `docs/add-a-mechanism.md` and `examples/add_your_own_mechanism.rs`.
 #![no_std]
 // `!(x >= y)` is how NaN ends on the side of the error.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
