@@ -127,6 +127,8 @@ errors! {
     ParamNameOpen "param-name" "the parameter name is not closed" "names look like #<name>";
     ParamNoMemory "param-memory" "named parameters need an interpreter with memory (feature alloc)" "use numbered parameters";
     ParameterFileDamaged "param-file" "the checksum does not fit the content" "the file was cut or changed: restore it from its .bak";
+    ParameterFileCut "param-file" "the file is not whole" "restore it from its .bak; without a file all parameters begin at 0";
+    ParameterFileLine "param-file" "not a parameter and its value" "write a number and a value, such as 5221 12.5";
     ParameterFileOrder { index: i32, last: i32 } "param-file" "parameter {index} comes after {last}" "numbers must rise";
     EqualMissing "param-equal" "'=' is missing in a parameter setting" "write #1 = 2";
     TooManySettings { limit: u8 } "param-count" "more than {limit} parameter settings in one block" "split the block";
