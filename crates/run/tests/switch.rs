@@ -118,6 +118,9 @@ fn the_interpreter_is_told_where_the_machine_stands() {
     let text = "F600\no1 sub\nM3 S100 M429 G4 P0.1\no1 endsub\nG1 Z5\no1 call\nG91 G1 W1\nM2\n";
     let (_, summary) = drive(text, &machine, &Options::default());
     assert!((summary.path_length_mm - 6.0).abs() < 1e-9, "{}", summary.path_length_mm);
+    // While it dwells it is on no programmed path; what H did is none of V's.
+    let deviation = summary.max_path_deviation_mm;
+    assert!(deviation <= summary.half_step_reach_mm, "{deviation}");
 }
 
 #[test]
