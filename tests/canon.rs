@@ -80,3 +80,47 @@ fn a_closed_pipe_ends_an_endless_program() {
     drop(lines);
     assert_eq!(child.wait().unwrap().code(), Some(0));
 }
+
+#[test]
+fn parameters_are_kept_from_program_to_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("pkm.var");
+    let bak = folder.path().join("pkm.var.bak");
+    let with = |program: &[u8]| {
+        pkm_with_input(&["canon", "-", "--mm", "--parameters", file.to_str().unwrap()], program)
+    };
+    let first = with(b"G10 L2 P2 X12.5 Y[1/3]\nG55\nM2\n");
+    assert_eq!(first.status, 0, "{}", first.stderr);
+    assert!(file.is_file() && !bak.exists());
+    let saved = std::fs::read(&file).unwrap();
+    // Saved after an error too, and the file before it stays.
+    let second = with(b"G10 L2 P2 X7\nG0 X#5242\nG77\nM2\n");
+    assert_eq!(second.status, 1);
+    assert!(second.stdout.contains("STRAIGHT_TRAVERSE(0.3333, "), "{}", second.stdout);
+    assert_eq!(std::fs::read(&bak).unwrap(), saved);
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(text.contains("\n5241\t7.000000\n5242\t0.3333333333333333\n"), "{text}");
+}
+
+#[test]
+fn a_damaged_parameter_file_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("pkm.var");
+    let name = file.to_str().unwrap();
+    let arguments = ["canon", "-", "--parameters", name];
+    assert_eq!(pkm_with_input(&arguments, b"G10 L2 P1 X5\nM2\n").status, 0);
+    let whole = std::fs::read(&file).unwrap();
+    for (text, place) in [
+        (&whole[..whole.len() / 2], "pkm.var:"),
+        (b"5221 1\n5161 2\n", "pkm.var:2"),
+        (b"5221 1x\n", "pkm.var:1"),
+        (b"", "pkm.var"),
+    ] {
+        write(&file, text);
+        let run = pkm_with_input(&arguments, b"G0 X1\nM2\n");
+        assert_eq!((run.status, run.stdout.as_str()), (2, ""));
+        assert!(run.stderr.contains("param-file") && run.stderr.contains(place), "{}", run.stderr);
+        assert_eq!(std::fs::read(&file).unwrap(), text, "a refused file is left as it is");
+    }
+    assert_eq!(pkm(&["canon", "-", "--parameters", folder.path().to_str().unwrap()]).status, 2);
+}

@@ -378,3 +378,34 @@ fn tools_come_from_the_tool_table() {
     let missing = pkm_with_input(&[&arguments[..], &["--tool-table", "none.tbl"]].concat(), program);
     assert_eq!((missing.status, &missing.json()["diagnostics"][0]["code"]), (2, &Value::from("tool-table")));
 }
+
+#[test]
+fn parameters_reach_the_machine_and_are_saved_after_a_completed_program_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("pkm.var");
+    let name = file.to_str().unwrap();
+    let with = |command: &str, program: &[u8]| {
+        pkm_with_input(&[command, "-", "--machine", "xyz", "--format", "json", "--parameters", name], program)
+    };
+    write(&file, "100 1.5\n5221 20\n");
+    let before = std::fs::read(&file).unwrap();
+    let checked = with("check", b"G10 L2 P1 X1e\nM2\n");
+    assert_eq!(checked.status, 1, "{}", checked.stdout);
+    assert_eq!(with("check", b"#100=2\nM2\n").status, 0);
+    assert_eq!(with("run", b"#100=2\nG77\nM2\n").status, 1);
+    assert_eq!(std::fs::read(&file).unwrap(), before, "nothing ran to its end");
+
+    let run = with("run", b"F600\n#100=[#100+1]\nG1 X1\nM2\n");
+    assert_eq!(run.status, 0, "{}", run.stdout);
+    assert_eq!(run.json()["joints"][0]["max"], 21.0, "the offset of the file counts");
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(text.contains("\n100\t2.500000\n"), "{text}");
+    assert_eq!(std::fs::read(folder.path().join("pkm.var.bak")).unwrap(), before);
+
+    write(&file, &text[..text.len() / 2]);
+    for command in ["run", "check"] {
+        let refused = with(command, b"M2\n");
+        assert_eq!(refused.status, 2);
+        assert_eq!(refused.json()["diagnostics"][0]["code"], "param-file");
+    }
+}

@@ -46,7 +46,7 @@ pub(crate) const fn is_persistent(index: i32) -> bool {
 pub(crate) const ARGUMENTS: usize = 30;
 
 /// All parameters of a program.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     numbered: [f64; COUNT],
     #[cfg(feature = "alloc")]
@@ -55,7 +55,7 @@ pub struct Parameters {
 
 /// Named parameters. A name is stored once, so that using it again allocates nothing.
 #[cfg(feature = "alloc")]
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 struct Named {
     names: BTreeMap<Box<[u8]>, u32>,
     /// Names that begin with `_`.

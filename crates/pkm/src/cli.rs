@@ -95,6 +95,10 @@ pub(crate) struct ProgramArgs {
     /// Tool table in LinuxCNC's format, lengths in mm
     #[arg(long, value_name = "FILE")]
     pub tool_table: Option<PathBuf>,
+    /// Parameter file in LinuxCNC's format, lengths in mm: read at the start; `run` saves it after a completed program
+    /// and keeps the old one as FILE.bak
+    #[arg(long, value_name = "FILE")]
+    pub parameters: Option<PathBuf>,
     /// Skip the lines that begin with `/`
     #[arg(long)]
     pub block_delete: bool,
@@ -157,6 +161,10 @@ pub(crate) struct Canon {
     /// Tool table in LinuxCNC's format
     #[arg(long, value_name = "FILE")]
     pub tool_table: Option<PathBuf>,
+    /// Parameter file in LinuxCNC's format, lengths in machine units: read at the start, saved at the end (also after an
+    /// error), the old one kept as FILE.bak
+    #[arg(long, value_name = "FILE")]
+    pub parameters: Option<PathBuf>,
     /// The machine's length unit is the inch, as in LinuxCNC's rs274 (the default)
     #[arg(long, conflicts_with = "mm")]
     pub inch: bool,

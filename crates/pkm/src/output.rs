@@ -99,6 +99,6 @@ pub(crate) fn failure(path: &Path, error: &io::Error) -> Failure {
         "output",
         &path.display().to_string(),
         format!("cannot write {}: {error}", path.display()),
-        "free space or choose another folder with --out; files that were there are as they were",
+        "free space or choose another folder; files that were there are as they were",
     )
 }

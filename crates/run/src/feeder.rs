@@ -8,7 +8,7 @@ use crate::switch::{FormSwitchDrive, switched};
 use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::{Canon, CanonSink, Span};
-use pkm_gcode::{Interpreter, LineSource, MachineCodes, Settings, Status};
+use pkm_gcode::{Interpreter, LineSource, MachineCodes, Parameters, Settings, Status};
 use pkm_hal_sim::{Setpoint, SetpointSource};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Joints, Kinematics, Pose, maths};
@@ -40,6 +40,9 @@ pub(crate) fn interpreter(machine: &Machine, options: &Options, start: &Pose) ->
     let mut interpreter = Interpreter::new(settings);
     if let Some(tools) = options.tools {
         interpreter.tools_mut().clone_from(tools);
+    }
+    if let Some(parameters) = options.parameters {
+        interpreter.parameters_mut().clone_from(parameters);
     }
     interpreter.set_machine_position_mm(face(&start.to_array()));
     interpreter
@@ -203,6 +206,11 @@ impl<'a> Feeder<'a> {
     /// True during a form switch: no path is programmed then.
     pub(crate) fn is_switching(&self) -> bool {
         self.form_switch.is_some()
+    }
+
+    /// The parameters as the program left them.
+    pub(crate) fn parameters(&self) -> &Parameters {
+        self.interpreter.parameters()
     }
 
     pub(crate) fn failure(&self) -> Option<&Diagnostic> {

@@ -20,7 +20,7 @@ pub use summary::{ClosestApproach, JointSummary, SCHEMA, Summary};
 
 use feeder::{Feeder, FeederError};
 use pkm_canon::diagnostic::{Diagnostic, Severity};
-use pkm_gcode::ToolTable;
+use pkm_gcode::{Parameters, ToolTable};
 use pkm_hal_sim::{JointConfig, Observer, Simulation, SimulationConfig, TickError};
 use pkm_kins::{Kinematics, Pose};
 use pkm_machine::Machine;
@@ -42,6 +42,8 @@ pub struct Options {
     pub block_delete: bool,
     /// The tools of the machine; none without it. Read once for the life of the process.
     pub tools: Option<&'static ToolTable>,
+    /// What the parameters are when the program begins; a fresh set without it.
+    pub parameters: Option<&'static Parameters>,
 }
 
 impl Default for Options {
@@ -53,6 +55,7 @@ impl Default for Options {
             max_ticks: 100_000_000,
             block_delete: false,
             tools: None,
+            parameters: None,
         }
     }
 }
@@ -152,6 +155,7 @@ fn drive<O: Observer>(
     let mut summary = account.finish(program, machine, &simulation, &feeder);
     summary.completed = completed && !findings.iter().any(|d| d.severity == Severity::Error);
     summary.diagnostics = findings;
+    summary.parameters = summary.completed.then(|| Box::new(feeder.parameters().clone()));
     Ok((summary, Some(outputs)))
 }
 

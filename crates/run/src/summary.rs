@@ -4,6 +4,7 @@ use crate::check::Checked;
 use crate::feeder::Feeder;
 use crate::program::Program;
 use pkm_canon::diagnostic::Diagnostic;
+use pkm_gcode::Parameters;
 use pkm_hal_sim::Simulation;
 use pkm_kins::machine::Mechanism;
 use pkm_kins::maths::sqrt;
@@ -90,6 +91,9 @@ pub struct Summary {
     /// What a person should know.
     #[serde(skip)]
     pub diagnostics: Vec<Diagnostic>,
+    /// The parameters after a program that was completed.
+    #[serde(skip)]
+    pub parameters: Option<Box<Parameters>>,
 }
 
 impl Summary {
@@ -126,6 +130,7 @@ impl Summary {
             delayed_steps: 0,
             max_step_delay_ns: 0,
             diagnostics: checked.diagnostics,
+            parameters: None,
         }
     }
 }
@@ -264,6 +269,7 @@ impl<'a> Account<'a> {
             delayed_steps: statistics.iter().map(|s| s.delayed_steps).sum(),
             max_step_delay_ns: statistics.iter().map(|s| s.max_delay_ns).max().unwrap_or(0),
             diagnostics: Vec::new(),
+            parameters: None,
         }
     }
 }

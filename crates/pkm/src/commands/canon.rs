@@ -1,13 +1,16 @@
 //! `pkm canon`: canonical commands as LinuxCNC's `rs274 -g` prints them.
 
 use crate::cli::{Canon, Dialect, OnError};
+use crate::commands::parameters::Kept;
 use crate::commands::{program, tool_table};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::render::diagnostics::Messages;
 use atomic_write_file::AtomicWriteFile;
 use pkm_canon::text::{Spelling, TextWriter};
-use pkm_gcode::{FileSource, LineSource, MemorySource, Place, Settings, SourceError, ToolTable, canon_text};
+use pkm_gcode::{
+    FileSource, Interpreter, LineSource, MemorySource, Place, Settings, SourceError, ToolTable, canon_text_of,
+};
 use pkm_run::Program;
 use std::cell::Cell;
 use std::io::{self, BufWriter, Write, stdout};
@@ -19,6 +22,16 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
     let tools = match &arguments.tool_table {
         Some(path) => tool_table::read(path, messages)?,
         None => ToolTable::default(),
+    };
+    let mut interpreter = Interpreter::new(settings(arguments));
+    *interpreter.tools_mut() = tools;
+    let kept = match &arguments.parameters {
+        Some(path) => {
+            let (kept, parameters) = Kept::read(path)?;
+            *interpreter.parameters_mut() = parameters;
+            Some(kept)
+        }
+        None => None,
     };
     let mut source: Box<dyn LineSource> = match &program {
         Program::File(path) => {
@@ -39,19 +52,14 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
     };
     match &arguments.output {
         None => {
-            print(
-                arguments,
-                tools,
-                source.as_mut(),
-                BufWriter::with_capacity(1 << 16, stdout().lock()),
-                report,
-            )?;
+            let writer = BufWriter::with_capacity(1 << 16, stdout().lock());
+            print(arguments, &mut interpreter, source.as_mut(), writer, report)?;
         }
         Some(path) => {
             let told = |error: io::Error| output::failure(path, &error);
             let file = AtomicWriteFile::open(path).map_err(told)?;
-            let file =
-                print(arguments, tools, source.as_mut(), BufWriter::new(file), report).map_err(told)?;
+            let file = print(arguments, &mut interpreter, source.as_mut(), BufWriter::new(file), report)
+                .map_err(told)?;
             file.into_inner()
                 .map_err(io::IntoInnerError::into_error)
                 .map_err(told)?
@@ -59,29 +67,39 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
                 .map_err(told)?;
         }
     }
+    if let Some(kept) = kept {
+        kept.save(interpreter.parameters())?;
+    }
     Ok(if failed { Outcome::No } else { Outcome::Clean })
+}
+
+/// The machine that `rs274` simulates, as far as the arguments do not say otherwise.
+fn settings(arguments: &Canon) -> Settings {
+    let rs274 = Settings::rs274();
+    Settings {
+        dialect: match arguments.dialect {
+            Dialect::LinuxCnc29 => pkm_gcode::Dialect::LinuxCnc29,
+            Dialect::LinuxCnc210 => pkm_gcode::Dialect::LinuxCnc210,
+            Dialect::Pkm => pkm_gcode::Dialect::Pkm,
+        },
+        axes: arguments.axes,
+        machine_units_per_mm: if arguments.mm { 1.0 } else { rs274.machine_units_per_mm },
+        block_delete: arguments.block_delete,
+        ..rs274
+    }
 }
 
 /// Prints the whole program; the writer comes back flushed.
 fn print<W: Write>(
     arguments: &Canon,
-    tools: ToolTable,
+    interpreter: &mut Interpreter,
     source: &mut dyn LineSource,
     mut writer: W,
     mut report: impl FnMut(&pkm_gcode::Error, &[u8]) -> bool,
 ) -> io::Result<W> {
-    let (dialect, spelling) = match arguments.dialect {
-        Dialect::LinuxCnc29 => (pkm_gcode::Dialect::LinuxCnc29, Spelling::V2_9),
-        Dialect::LinuxCnc210 => (pkm_gcode::Dialect::LinuxCnc210, Spelling::V2_10),
-        Dialect::Pkm => (pkm_gcode::Dialect::Pkm, Spelling::V2_9),
-    };
-    let rs274 = Settings::rs274();
-    let settings = Settings {
-        dialect,
-        axes: arguments.axes,
-        machine_units_per_mm: if arguments.mm { 1.0 } else { rs274.machine_units_per_mm },
-        block_delete: arguments.block_delete,
-        ..rs274
+    let spelling = match arguments.dialect {
+        Dialect::LinuxCnc29 | Dialect::Pkm => Spelling::V2_9,
+        Dialect::LinuxCnc210 => Spelling::V2_10,
     };
     let stop = Cell::new(false);
     let mut error = None;
@@ -93,7 +111,7 @@ fn print<W: Write>(
     };
     let mut text = TextWriter::new(&mut line, spelling);
     let mut source = Stoppable { source, stop: &stop };
-    canon_text(settings, tools, &mut source, &mut text, |error, line| !stop.get() && report(error, line));
+    canon_text_of(interpreter, &mut source, &mut text, |error, line| !stop.get() && report(error, line));
     match error {
         Some(error) => Err(error),
         None => {

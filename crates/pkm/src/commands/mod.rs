@@ -5,6 +5,7 @@ pub(crate) mod check;
 pub(crate) mod generate;
 pub(crate) mod kins;
 pub(crate) mod machines;
+pub(crate) mod parameters;
 pub(crate) mod plan;
 pub(crate) mod program;
 pub(crate) mod run;

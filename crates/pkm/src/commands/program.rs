@@ -1,6 +1,7 @@
 //! What `run` and `check` have in common: the program, the machine, the start pose.
 
 use crate::cli::ProgramArgs;
+use crate::commands::parameters::Kept;
 use crate::commands::tool_table;
 use crate::outcome::Failure;
 use crate::render::diagnostics::{self, Messages};
@@ -21,6 +22,8 @@ pub(crate) struct Job {
     pub program: Program,
     pub machine: Machine,
     pub options: Options,
+    /// The parameter file, to save it.
+    pub kept: Option<Kept>,
 }
 
 /// The answer in JSON when the question could not be asked.
@@ -56,8 +59,16 @@ impl Job {
             Some(path) => Some(&*Box::leak(Box::new(tool_table::read(path, messages)?))),
             None => None,
         };
-        let options = Options { start, block_delete: arguments.block_delete, tools, ..Options::default() };
-        Ok(Self { program, machine, options })
+        let (kept, parameters) = match &arguments.parameters {
+            Some(path) => {
+                let (kept, parameters) = Kept::read(path)?;
+                (Some(kept), Some(&*Box::leak(Box::new(parameters))))
+            }
+            None => (None, None),
+        };
+        let block_delete = arguments.block_delete;
+        let options = Options { start, block_delete, tools, parameters, ..Options::default() };
+        Ok(Self { program, machine, options, kept })
     }
 }
 

@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &Run, messages: &Messages) -> Result<Outcome, Failu
 }
 
 fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
-    let Job { program, machine, options } = Job::new(&arguments.program, messages)?;
+    let Job { program, machine, options, kept } = Job::new(&arguments.program, messages)?;
     let options = Options {
         feed_override: arguments.feed_override / 100.0,
         substeps: arguments.trace_substeps,
@@ -89,6 +89,9 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
     let (summary, files) = result?;
     if let (Some(folder), Some(files), Some(summary_file)) = (folder, files, summary_file) {
         save(folder, files, summary_file, &summary)?;
+    }
+    if let (Some(kept), Some(parameters)) = (&kept, &summary.parameters) {
+        kept.save(parameters)?;
     }
     let mut out = stdout().lock();
     match arguments.program.format {
