@@ -270,5 +270,19 @@ int main(int argc, char **argv) {
   must(pkm_lambda6(&six->machine, &lambda, &error), &error);
   fill(six, (PkmPose){.z = -1500}, 150, 10);
   compare(cases, n);
+
+  n = 0;
+  pin_count = 0;
+  Case *trivial = cases[n++] = calloc(1, sizeof *trivial);
+  trivial->name = "LinuxCNC trivkins";
+  load(folder, "trivkins", &trivial->forward, &trivial->inverse);
+  fill(trivial, (PkmPose){0}, 100, 0);
+  static const char *const letters[] = {"XYZ", "XYZABCUVW"};
+  for (int i = 0; i < 2; i++) {
+    Case *c = cases[n++] = our(i ? "cartesian, nine axes" : "cartesian, three axes");
+    must(pkm_cartesian(&c->machine, letters[i], &error), &error);
+    fill(c, (PkmPose){0}, 100, i ? 90 : 0);
+  }
+  compare(cases, n);
   return 0;
 }

@@ -211,6 +211,16 @@ fn from_pose(p: &Pose) -> PkmPose {
     PkmPose { x: p.x, y: p.y, z: p.z, a, b, c, u: p.u, v: p.v, w: p.w }
 }
 
+/// Turns the rotary ones among a machine's joints into degrees.
+#[inline]
+fn to_degrees(machine: &PkmMachine, joints: &mut Joints) {
+    let mut rotary = machine.degrees & !ROTARY_AXIS;
+    while let Some(joint) = joints.get_mut(rotary.trailing_zeros() as usize) {
+        *joint = degrees(*joint);
+        rotary &= rotary.wrapping_sub(1);
+    }
+}
+
 /// Joints in radians.
 fn joints_from(machine: &PkmMachine, given: &Joints) -> Joints {
     let mut all = *given;
@@ -224,9 +234,10 @@ fn joints_from(machine: &PkmMachine, given: &Joints) -> Joints {
 
 /// Writes the machine's joints in degrees.
 fn joints_to(machine: &PkmMachine, all: &Joints, joints: &mut Joints) {
-    for (i, (place, q)) in joints.iter_mut().zip(all).take(machine.joint_count as usize).enumerate() {
-        *place = if machine.degrees >> i & 1 == 1 { degrees(*q) } else { *q };
+    for (place, q) in joints.iter_mut().zip(all).take(machine.joint_count as usize) {
+        *place = *q;
     }
+    to_degrees(machine, joints);
 }
 
 /// Pose → joints, with the caller's own numbers where nothing of the machine is in degrees.
@@ -242,12 +253,8 @@ fn inverse(machine: &PkmMachine, pose: &PkmPose, joints: &mut Joints) -> Result<
 
 #[inline(never)]
 fn inverse_in_degrees(machine: &PkmMachine, pose: &PkmPose, joints: &mut Joints) -> Result<(), InverseError> {
-    let mechanism = machine.mechanism();
-    let pose = to_pose(pose);
-    if machine.degrees == ROTARY_AXIS {
-        return mechanism.inverse_into(&pose, joints);
-    }
-    joints_to(machine, &mechanism.inverse(&pose)?, joints);
+    machine.mechanism().inverse_into(&to_pose(pose), joints)?;
+    to_degrees(machine, joints);
     Ok(())
 }
 

@@ -12,6 +12,8 @@ use crate::pose::{Axis, AxisSet, Pose};
 pub struct Cartesian {
     axes: AxisSet,
     joints: usize,
+    /// The coordinate of each joint, as its place in letter order.
+    order: [u8; MAX_JOINTS],
 }
 
 impl Cartesian {
@@ -22,17 +24,31 @@ impl Cartesian {
     pub fn new(axes: AxisSet) -> Result<Self, GeometryError> {
         match axes.iter().count() {
             0 => Err(GeometryError::NoAxis),
-            joints => Ok(Self { axes, joints }),
+            joints => {
+                let mut order = [0; MAX_JOINTS];
+                for (place, axis) in order.iter_mut().zip(axes.iter()) {
+                    *place = axis as u8;
+                }
+                Ok(Self { axes, joints, order })
+            }
         }
     }
 
     /// The coordinates of the set, packed in letter order.
     fn pack(&self, pose: &Pose) -> Joints {
         let mut joints = [0.0; MAX_JOINTS];
-        for (joint, axis) in joints.iter_mut().zip(self.axes.iter()) {
-            *joint = pose.get(axis);
-        }
+        self.write(pose, &mut joints);
         joints
+    }
+
+    #[inline]
+    fn write(&self, pose: &Pose, joints: &mut Joints) {
+        let all = pose.to_array();
+        for (joint, &place) in joints.iter_mut().zip(&self.order).take(self.joints) {
+            if let Some(value) = all.get(usize::from(place)) {
+                *joint = *value;
+            }
+        }
     }
 
     fn axis(&self, joint: usize) -> Axis {
@@ -62,6 +78,14 @@ impl Kinematics for Cartesian {
             return Err(InverseError::NotFinite);
         }
         Ok(self.pack(pose))
+    }
+
+    fn inverse_into(&self, pose: &Pose, joints: &mut Joints) -> Result<(), InverseError> {
+        if !pose.is_finite() {
+            return Err(InverseError::NotFinite);
+        }
+        self.write(pose, joints);
+        Ok(())
     }
 
     fn forward(&self, joints: &Joints, _: &Pose) -> Result<Pose, ForwardError> {
