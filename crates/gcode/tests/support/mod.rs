@@ -4,7 +4,8 @@
 pub mod generator;
 
 use pkm_canon::text::{Spelling, TextWriter};
-use pkm_gcode::{MemorySource, Settings, ToolTable, canon_text};
+use pkm_gcode::{FileSource, LineSource, MemorySource, Settings, ToolTable, canon_text};
+use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
 
@@ -34,12 +35,21 @@ fn stream(text: &[u8]) -> Vec<String> {
 
 /// The program as pkm interprets it, on the machine that `rs274` simulates.
 pub fn pkm(program: &[u8]) -> Outcome {
-    let tools = ToolTable::parse(TOOLS.as_bytes(), |_, _| {}).expect("a small table");
+    interpret(&mut MemorySource::new(program), TOOLS.as_bytes())
+}
+
+/// A program file as pkm interprets it, with a tool table; subroutine files stand beside it.
+pub fn pkm_file(program: &Path, tools: &[u8]) -> Outcome {
+    let beside = program.parent().expect("a folder").to_path_buf();
+    interpret(&mut FileSource::open(program, vec![beside]).expect("a file"), tools)
+}
+
+fn interpret(source: &mut dyn LineSource, tools: &[u8]) -> Outcome {
+    let tools = ToolTable::parse(tools, |_, _| {}).expect("a small table");
     let mut output: Vec<u8> = Vec::new();
     let mut writer = TextWriter::new(|bytes: &[u8]| output.extend_from_slice(bytes), Spelling::V2_9);
     let (mut failed_block, mut message) = (None, String::new());
-    let mut source = MemorySource::new(program);
-    canon_text(Settings::rs274(), tools, &mut source, &mut writer, |error, line| {
+    canon_text(Settings::rs274(), tools, source, &mut writer, |error, line| {
         failed_block = Some(text_of(line));
         message = format!("[{}] {error} at {:?}", error.kind.code(), error.span);
         false
@@ -58,8 +68,14 @@ pub fn rs274(program: &[u8], directory: &Path) -> Option<Outcome> {
     let tools = directory.join("tool.tbl");
     write(&file, program);
     write(&tools, TOOLS.as_bytes());
+    rs274_file(&file, &tools, directory)
+}
+
+/// A program file as `rs274 -g` interprets it, run in `directory`; `None` if it does not end in time.
+pub fn rs274_file(program: &Path, tools: &Path, directory: &Path) -> Option<Outcome> {
     let output = Command::new("timeout")
-        .args(["10", "rs274", "-t", "tool.tbl", "-g", "program.ngc"])
+        .args(["10", "rs274"].map(OsStr::new))
+        .args([OsStr::new("-t"), tools.as_os_str(), OsStr::new("-g"), program.as_os_str()])
         .current_dir(directory)
         .output()
         .expect("rs274 runs");
