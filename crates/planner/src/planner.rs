@@ -287,7 +287,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             motion: self.moves.wrapping_sub(1),
             span,
         });
-        Ok(())
+        // With nothing before it, it must count as something to do at once.
+        self.refill().map_err(PushError::Plan)
     }
 
     /// Nothing follows for now: the last move is released to its end, where the machine comes to rest.

@@ -118,7 +118,10 @@ fn the_interpreter_is_told_where_the_machine_stands() {
     let text = "F600\no1 sub\nM3 S100 M429 G4 P0.1\no1 endsub\nG1 Z5\no1 call\nG91 G1 W1\nM2\n";
     let (_, summary) = drive(text, &machine, &Options::default());
     assert!((summary.path_length_mm - 6.0).abs() < 1e-9, "{}", summary.path_length_mm);
-    // While it dwells it is on no programmed path; what H did is none of V's.
+    // What H did is no path of V's.
+    let (_, summary) = drive("F600\nG1 Z5\nM429 G4 P0.1\nM2\n", &machine, &Options::default());
+    let (_, without) = drive("F600\nG1 Z5\nM429\nM2\n", &machine, &Options::default());
+    assert_eq!(summary.servo_ticks, without.servo_ticks + 100, "the dwell after a switch is no less a dwell");
     let deviation = summary.max_path_deviation_mm;
     assert!(deviation <= summary.half_step_reach_mm, "{deviation}");
 }
@@ -173,6 +176,11 @@ fn the_form_switch_is_a_joint_move_at_constant_x_and_z() {
             let on: Vec<&Row> = rows.iter().filter(|row| row.line == 3).collect();
             let x = on.iter().fold(0.0_f64, |worst, row| worst.max((row.place[0] - 66.0).abs()));
             let z = on.iter().fold(0.0_f64, |worst, row| worst.max((row.place[2] - 100.0).abs()));
+            if smoothing == "0" {
+                // Begins with a servo period, so that the servo sees the stop before it.
+                let first = rows.iter().position(|row| row.line == 3).unwrap();
+                assert_eq!(first % substeps as usize, 0);
+            }
             // An average is half a window late: its last rows already hold a little of the next move.
             let slack = if smoothing == "0" { 1e-9 } else { 2e-3 };
             assert!(x < slack && z < slack, "{smoothing} {substeps}: {x} {z}");
