@@ -89,9 +89,12 @@ fn the_aerofoil_runs_on_moma_w_within_every_limit() {
 
 #[test]
 fn check_accepts_the_shipped_programs() {
-    for (program, machine) in
-        [("moma-w-aerofoil.ngc", "moma-w"), ("moma-w-moulding.ngc", "moma-w"), ("moma-arcs.ngc", "moma-a")]
-    {
+    for (program, machine) in [
+        ("moma-w-aerofoil.ngc", "moma-w"),
+        ("moma-w-moulding.ngc", "moma-w"),
+        ("moma-arcs.ngc", "moma-a"),
+        ("hv-mill-both.ngc", "hv-mill-7"),
+    ] {
         let check = pkm(&["check", &shipped(program), "--machine", machine, "--format", "json"]);
         assert_eq!(check.status, 0, "{program}: {}{}", check.stdout, check.stderr);
         let answer = check.json();
