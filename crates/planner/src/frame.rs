@@ -42,6 +42,8 @@ pub struct Frame {
     per_turn: bool,
     spindle_rpm: f64,
     mode: PathMode,
+    /// G64 Q, mm.
+    merge_mm: f64,
     default_tolerance: Tolerance,
     /// Machine coordinates, mm and rad.
     position: Vector,
@@ -62,6 +64,7 @@ impl Frame {
             per_turn: false,
             spindle_rpm: 0.0,
             mode: PathMode::Blend(default_tolerance),
+            merge_mm: 0.0,
             default_tolerance,
             position,
         }
@@ -75,6 +78,11 @@ impl Frame {
     /// The machine stands elsewhere than the program took it: machine coordinates, mm and rad.
     pub fn set_position(&mut self, position: Vector) {
         self.position = position;
+    }
+
+    /// Within what chords may be joined to one line: G64 Q, mm; 0 in the exact modes.
+    pub fn merge_tolerance_mm(&self) -> f64 {
+        if matches!(self.mode, PathMode::Blend(_)) { self.merge_mm } else { 0.0 }
     }
 
     /// Takes one command and calls `emit` with what it asks of the machine; state changes ask nothing.
@@ -106,6 +114,7 @@ impl Frame {
             Canon::SetG92Offset(offset) => self.g92 = self.scaled(offset),
             Canon::UseToolLengthOffset(offset) => self.tool = self.scaled(offset),
             Canon::SetXyRotation(degrees) => self.rotation = pkm_kins::maths::cos_sin_deg(degrees),
+            Canon::SetNaivecamTolerance(q) => self.merge_mm = (q * self.unit_mm).max(0.0),
             Canon::SetMotionControlMode(mode) => {
                 let p = self.default_tolerance;
                 self.mode = match mode {

@@ -365,6 +365,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.pieces.get(usize::try_from(index).ok()?)
     }
 
+    /// True when nothing moves.
+    pub fn at_rest(&self) -> bool {
+        self.executor.has_settled()
+    }
+
     /// True when everything pushed has been driven and the machine is at rest.
     pub fn is_idle(&self) -> bool {
         let gridded = self.grid.piece + 1 >= self.first_piece + self.pieces.len() as u64;

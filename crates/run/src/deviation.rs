@@ -12,6 +12,7 @@ pub(crate) struct Programmed {
 }
 
 impl Programmed {
+    /// A move of the planner, or one of the chords it stands for.
     pub(crate) fn push(&mut self, motion: u32, geometry: Geometry) {
         self.moves.push_back((motion, geometry));
     }
@@ -24,13 +25,29 @@ impl Programmed {
     /// Distance (mm; the larger of XYZ and UVW) of a pose from the path, while the planner is on move `motion`,
     /// at `s` of it, or on the blend after it.
     pub(crate) fn distance_mm(&mut self, motion: u32, s: f64, blending: bool, pose: &Vector) -> Option<f64> {
-        while self.moves.get(1).is_some_and(|(number, _)| *number <= motion) {
+        while self.moves.front().is_some_and(|(number, _)| *number < motion)
+            && self.moves.get(1).is_some_and(|(number, _)| *number <= motion)
+        {
             self.moves.pop_front();
         }
-        let (_, geometry) = self.moves.front().filter(|(number, _)| *number <= motion)?;
-        let mut best = distance_mm(geometry, if blending { geometry.length() } else { s }, pose);
-        if blending && let Some((_, next)) = self.moves.get(1) {
-            best = best.min(distance_mm(next, 0.0, pose));
+        let &(here, _) = self.moves.front().filter(|(number, _)| *number <= motion)?;
+        let next = self.moves.iter().map(|(number, _)| *number).find(|number| *number != here);
+        let mut best = f64::INFINITY;
+        for (k, (number, geometry)) in self.moves.iter().enumerate() {
+            let alone = |k: usize| self.moves.get(k).is_none_or(|(other, _)| other != number);
+            let guess = match *number {
+                // One of several chords: a line is found from anywhere.
+                n if (n == here || blending && Some(n) == next)
+                    && !(alone(k + 1) && alone(k.wrapping_sub(1))) =>
+                {
+                    0.5 * geometry.length()
+                }
+                n if n == here && blending => geometry.length(),
+                n if n == here => s,
+                n if blending && Some(n) == next => 0.0,
+                _ => break,
+            };
+            best = best.min(distance_mm(geometry, guess, pose));
         }
         Some(best)
     }

@@ -13,8 +13,10 @@ use pkm_hal_sim::{Setpoint, SetpointSource};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Joints, Kinematics, Pose, maths};
 use pkm_machine::{Machine, Switched};
-use pkm_planner::path::{Tolerance, Vector, feed_length};
-use pkm_planner::{AxisLimits, Event, Frame, JointLimits, Limits, Planner, PushError, Smoother, State};
+use pkm_planner::path::{Geometry, Line, Tolerance, Vector, feed_length};
+use pkm_planner::{
+    AxisLimits, Chords, Event, Frame, JointLimits, Limits, Merger, Move, Planner, PushError, Smoother, State,
+};
 use std::collections::VecDeque;
 use std::fmt;
 
@@ -109,6 +111,9 @@ pub(crate) struct Feeder<'a> {
     delay: usize,
     setpoint: pkm_planner::Setpoint,
     queue: VecDeque<(Event, Span)>,
+    merger: Merger,
+    /// Moves that have left the merger, with the chords they stand for.
+    merged: VecDeque<(Move, Chords)>,
     start: Pose,
     program_ended: bool,
     failure: Option<Diagnostic>,
@@ -178,6 +183,8 @@ impl<'a> Feeder<'a> {
             delay: window / 2,
             setpoint,
             queue: VecDeque::new(),
+            merger: Merger::default(),
+            merged: VecDeque::new(),
             start,
             program_ended: false,
             failure: None,
@@ -195,7 +202,10 @@ impl<'a> Feeder<'a> {
     pub(crate) fn is_done(&mut self) -> bool {
         self.fill();
         let waits = self.code.is_some() || self.form_switch.is_some();
-        self.program_ended && self.queue.is_empty() && !waits && self.planner.is_idle()
+        // What lies behind a place that cannot be planned is never driven.
+        let driven = self.planner.is_idle() || self.failure.is_some() && self.planner.at_rest();
+        let taken = self.queue.is_empty() && self.merged.is_empty();
+        self.program_ended && taken && !waits && driven
     }
 
     /// The mechanism in force.
@@ -238,13 +248,20 @@ impl<'a> Feeder<'a> {
                 if let Err(failure) = self.switch(code) {
                     self.fail(failure);
                 }
+            } else if let Some((step, chords)) = self.merged.pop_front() {
+                if let Err(failure) = self.push(step, &chords) {
+                    self.fail(failure);
+                }
             } else if let Some((event, span)) = self.queue.pop_front() {
                 if let Err(failure) = self.take(event, span) {
                     self.fail(failure);
                 }
             } else if self.program_ended {
-                self.planner.finish();
-                return;
+                self.flush_merger();
+                if self.merged.is_empty() {
+                    self.planner.finish();
+                    return;
+                }
             } else if self.synch {
                 self.synch = false;
                 self.interpreter.set_machine_position_mm(face(self.frame.position()));
@@ -273,6 +290,8 @@ impl<'a> Feeder<'a> {
         self.failure.get_or_insert(failure);
         self.program_ended = true;
         self.queue.clear();
+        self.merger = Merger::default();
+        self.merged.clear();
         self.code = None;
     }
 
@@ -319,32 +338,64 @@ impl<'a> Feeder<'a> {
         }
     }
 
+    /// What waits in the merger goes on its way.
+    fn flush_merger(&mut self) {
+        self.merger.flush(|step, chords| self.merged.push_back((step, chords.clone())));
+    }
+
     fn take(&mut self, event: Event, span: Span) -> Result<(), Diagnostic> {
-        let pushed = match event {
-            Event::Unsupported(what) => return Err(messages::unsupported(self.program, span, what)),
+        if let Event::Move(step) = event {
+            let within_mm = self.frame.merge_tolerance_mm();
+            self.merger.push(step, within_mm, |step, chords| self.merged.push_back((step, chords.clone())));
+            return Ok(());
+        }
+        self.flush_merger();
+        if !self.merged.is_empty() {
+            self.queue.push_front((event, span));
+            return Ok(());
+        }
+        match event {
+            Event::Unsupported(what) => Err(messages::unsupported(self.program, span, what)),
             Event::MachineCode(number) => {
                 self.planner.finish();
                 self.code = Some((number, span));
-                return Ok(());
+                Ok(())
             }
             Event::Stop => {
                 self.planner.finish();
-                return Ok(());
+                Ok(())
             }
-            Event::Dwell { ns } => self.planner.push_dwell(ns, span),
-            Event::Move(step) => self.planner.push(step).map(|motion| {
-                let length = step.geometry.length();
-                self.path_length_mm += length * feed_length(&step.geometry.at(0.0).first, step.feed.group);
-                if length > 0.0 {
-                    self.programmed.push(motion, step.geometry);
-                }
-            }),
-        };
-        match pushed {
-            Ok(()) => Ok(()),
-            Err(PushError::Plan(error)) => Err(messages::plan(self.program, self.machine, &error)),
+            Event::Dwell { ns } => self.planner.push_dwell(ns, span).map_err(|error| self.refused(&error)),
+            // Taken above.
+            Event::Move(_) => Ok(()),
+        }
+    }
+
+    fn push(&mut self, step: Move, chords: &Chords) -> Result<(), Diagnostic> {
+        let mut start = step.geometry.at(0.0);
+        let motion = self.planner.push(step).map_err(|error| self.refused(&error))?;
+        let length = step.geometry.length();
+        self.path_length_mm += length * feed_length(&start.first, step.feed.group);
+        if chords.len() <= 1 {
+            if length > 0.0 {
+                self.programmed.push(motion, step.geometry);
+            }
+            return Ok(());
+        }
+        for end in chords {
+            if let Some(line) = Line::new(start.position, *end) {
+                self.programmed.push(motion, Geometry::Line(line));
+            }
+            start.position = *end;
+        }
+        Ok(())
+    }
+
+    fn refused(&self, error: &PushError) -> Diagnostic {
+        match error {
+            PushError::Plan(error) => messages::plan(self.program, self.machine, error),
             // `has_room` was asked.
-            Err(PushError::Full) => Err(messages::host(self.program, "the planner's queue overran")),
+            PushError::Full => messages::host(self.program, "the planner's queue overran"),
         }
     }
 }
