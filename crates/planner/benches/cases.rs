@@ -1,5 +1,6 @@
 //! `cargo bench --package pkm-planner`: what the planner makes of the cases P01 to P17, and what that costs.
-//! `cargo bench --package pkm-planner -- P03 P12` takes these only.
+//! `cargo bench --package pkm-planner -- P03 P12` takes these only, `--plain` prints `case nodes ns_per_node s` for
+//! `toppra.py`.
 //!
 //! A run is deterministic, so tick k does the same work every time: its cost is the median over the runs, which are
 //! interleaved case by case. What reading the clock costs is measured and taken off.
@@ -29,9 +30,13 @@ fn main() {
     let wanted: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let mut cases = all();
     cases.retain(|known| wanted.is_empty() || wanted.iter().any(|w| w == known.id));
+    let plain = std::env::args().any(|a| a == "--plain");
     with_stack(|| {
+        if plain {
+            return cost(&cases, true);
+        }
         outcome(&cases);
-        cost(&cases);
+        cost(&cases, false);
         if wanted.is_empty() {
             chords();
         }
@@ -211,7 +216,7 @@ fn run_any(known: &Known, clock_ns: f64) -> Run {
     }
 }
 
-fn cost(cases: &[Known]) {
+fn cost(cases: &[Known], plain: bool) {
     let clock_ns = clock_ns();
     let mut runs: Vec<Vec<Run>> = cases.iter().map(|_| Vec::new()).collect();
     for _ in 0..RUNS {
@@ -219,30 +224,33 @@ fn cost(cases: &[Known]) {
             runs.push(run_any(known, clock_ns));
         }
     }
-    println!(
-        "\nCost in ns. A node: grid (path, kinematics, spacing), look-ahead (x times how often a node is planned), drive (the tick's part"
-    );
-    println!(
-        "of planning); together: pushing and ticking the whole case, less its setpoints, per node. A tick: nodes set, planned, passed."
-    );
-    println!(
-        "{:4} {:>7} {:>6} {:>6} {:>12} {:>6} {:>9} {:>9}  {:>7} {:>7} {:>7}  {:>5} {:>5} {:>5}  {:>8}",
-        "case",
-        "nodes",
-        "calls",
-        "grid",
-        "look-ahead",
-        "drive",
-        "together",
-        "setpoint",
-        "tick med",
-        "99 %",
-        "max",
-        "set",
-        "plan",
-        "pass",
-        "push max"
-    );
+    if !plain {
+        println!(
+            "\nCost in ns. A node: grid (path, kinematics, spacing; with the push), look-ahead (x how often a node is planned),"
+        );
+        println!(
+            "drive (the tick's part of planning); together: all pushes and ticks, less what a tick between two nodes costs."
+        );
+        println!("A tick: between two nodes, median, 99 %, most; the most nodes it set, planned, passed.");
+        println!(
+            "{:4} {:>7} {:>6} {:>6} {:>12} {:>6} {:>9}  {:>7} {:>7} {:>7} {:>7}  {:>5} {:>5} {:>5}  {:>8}",
+            "case",
+            "nodes",
+            "calls",
+            "grid",
+            "look-ahead",
+            "drive",
+            "together",
+            "between",
+            "median",
+            "99 %",
+            "max",
+            "set",
+            "plan",
+            "pass",
+            "push max"
+        );
+    }
     for (known, runs) in cases.iter().zip(&runs) {
         let first = &runs[0].ticks;
         let count = |f: fn(&Work) -> u64| first.iter().map(|t| f(&t.work)).sum::<u64>() as f64;
@@ -255,19 +263,26 @@ fn cost(cases: &[Known]) {
         let push_ns = per_tick(&|t| t.push_ns);
         let setpoint_ns = of_runs(&|run| run.setpoint_ns);
         let nodes = count(|w| w.nodes);
-        let all_ns = tick_ns.iter().chain(&push_ns).sum::<f64>() - setpoint_ns * first.len() as f64;
+        // Ticks between two nodes plan nothing; where there are none, a tick at rest has to serve.
+        let between: Vec<f64> =
+            (0..first.len()).filter(|&k| first[k].work == Work::default()).map(|k| tick_ns[k]).collect();
+        let base_ns = if between.len() > 10 { median(between) } else { setpoint_ns };
+        let all_ns = tick_ns.iter().chain(&push_ns).sum::<f64>() - base_ns * first.len() as f64;
         let grid_ns = of_runs(&|run| run.grid_ns);
         let look_ahead_ns = of_runs(&|run| run.look_ahead_ns);
         let planned = count(|w| w.planned);
         // Ticks that only drive.
         let driving: Vec<usize> = (0..first.len()).filter(|&k| first[k].work.nodes == 0).collect();
         let passed: u64 = driving.iter().map(|&k| first[k].work.passed).sum();
-        let drive_ns =
-            driving.iter().map(|&k| tick_ns[k] - setpoint_ns).sum::<f64>() / (passed as f64).max(1.0);
+        let drive_ns = driving.iter().map(|&k| tick_ns[k] - base_ns).sum::<f64>() / (passed as f64).max(1.0);
+        if plain {
+            println!("{} {nodes} {:.1} {:.4}", known.id, all_ns / nodes, (first.len() - 1) as f64 * 1e-3);
+            continue;
+        }
         tick_ns.sort_by(f64::total_cmp);
         let share = |p: f64| tick_ns[((tick_ns.len() - 1) as f64 * p) as usize];
         println!(
-            "{:4} {:7} {:6.2} {:6.0} {:6.0} x{:5.1} {:6.0} {:9.0} {:9.0}  {:8.0} {:7.0} {:7.0}  {:5} {:5} {:5}  {:8.0}",
+            "{:4} {:7} {:6.2} {:6.0} {:6.0} x{:4.1} {:6.0} {:9.0}  {:7.0} {:7.0} {:7.0} {:7.0}  {:5} {:5} {:5}  {:8.0}",
             known.id,
             nodes,
             count(|w| w.samples) / nodes,
@@ -276,7 +291,7 @@ fn cost(cases: &[Known]) {
             planned / nodes,
             drive_ns,
             all_ns / nodes,
-            setpoint_ns,
+            base_ns,
             share(0.5),
             share(0.99),
             share(1.0),
@@ -285,6 +300,9 @@ fn cost(cases: &[Known]) {
             most(|w| w.passed),
             push_ns.iter().skip(1).copied().fold(0.0, f64::max),
         );
+    }
+    if plain {
+        return;
     }
     println!(
         "(reading the clock, taken off: {clock_ns:.0} ns; the first push fills the queue and is left out of the maxima)"

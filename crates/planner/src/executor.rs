@@ -104,7 +104,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             self.executor.feed_override = feed;
             self.executor.rapid_override = rapid;
             self.executor.planned = false;
-            self.look_ahead(0);
+            self.look_ahead_anew();
         }
         true
     }
@@ -185,7 +185,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let last = self.first_piece + (self.pieces.len() as u64).saturating_sub(1);
         let all_known =
             self.grid.piece == last && self.pieces.back().is_some_and(|p| p.open && self.grid.s >= p.to);
-        if all_known && self.brakes_now() {
+        if all_known && self.grid.planned >= self.nodes.len() && self.brakes_now() {
             self.finish();
             let _ = self.refill();
         }
@@ -269,6 +269,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn pass_node(&mut self) {
         self.nodes.pop_front();
         self.work.passed += 1;
+        self.grid.planned = self.grid.planned.saturating_sub(1);
         let Some(front) = self.nodes.front() else { return };
         // The piece before stays: the setpoint of a stop at its end is still on it.
         while self.first_piece < front.piece && self.pieces.len() > 1 {
@@ -283,14 +284,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let (Some(node), Some(next)) = (self.nodes.front(), self.nodes.get(1)) else { return false };
         let (sigma, x) = (self.executor.sigma, self.executor.x);
         let length = node.length - sigma;
-        let mut here = node.right;
-        if sigma > 0.0
-            && let Some(piece) = self.piece(node.piece)
-            && let Ok(sample) =
-                self.limits.sample(&self.kinematics, &piece.geometry, node.s + sigma, piece.feed, piece.span)
-        {
-            here = sample.rows;
-        }
+        let anew = self
+            .piece(node.piece)
+            .filter(|_| sigma > 0.0)
+            .and_then(|piece| self.limits.sample(&self.kinematics, piece, node.s + sigma).ok());
+        let here = anew.as_ref().map_or(&node.right, |sample| &sample.rows);
         let (feed, rapid) = self.executor.overrides();
         // What is being driven, if it leads to the node (a braking leg may end before).
         let running =
@@ -305,10 +303,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             if x == 0.0 {
                 return false;
             }
-            let (end, x_end) = braking(&here, &next.left, rows, length, x, running);
+            let (end, x_end) = braking(here, &next.left, rows, length, x, running);
             add(end, x_end);
         } else {
-            let (low, high) = exits(&here, &next.left, rows, length, x);
+            let (low, high) = exits(here, &next.left, rows, length, x);
             // From the middle of an interval the strips, taken there anew, may exclude by a hair what is being driven;
             // that stays admissible.
             let (low, high) = running.map_or((low, high), |running| (low.min(running), high.max(running)));
@@ -319,7 +317,15 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             }
             // A stop to the left does not cap what is in between.
             let cap = node.speed_cap(feed, rapid).min(next.speed_cap(feed, rapid));
-            match faster(&here, &next.left, rows, length, x, x_end, cap) {
+            // A peak in between gains something only where the exit is held down by what follows, not by the strips,
+            // and where the interval takes more than a quarter of a period.
+            let quarter = 0.25 * self.settings.servo_period_s;
+            let brief = length * length <= x.min(x_end) * quarter * quarter;
+            let edge = 1e-3 * (high - low);
+            let free = (low <= 0.0 || x_end - low > edge) && high - x_end > edge && cap > x.min(x_end);
+            let shape =
+                if free && !brief { faster(here, &next.left, rows, length, x, x_end, cap) } else { None };
+            match shape {
                 Some((up, along, peak)) => {
                     if up > 0.0 {
                         add(up, peak);

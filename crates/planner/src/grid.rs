@@ -1,6 +1,6 @@
 //! Nodes along the path, and the look-ahead over them.
 //!
-//! The grid walks along the pieces and sets a node wherever the strips (see `limits`) have changed by 1 %; on a line
+//! The grid walks along the pieces and sets a node wherever the strips (see `limits`) have changed by 0.7 %; on a line
 //! of a Cartesian machine that is at its ends only. The look-ahead then computes for every node, from the end of what is
 //! known backwards, the largest x = ṡ² from which the machine can still follow: the controllable set of TOPP-RA.
 
@@ -12,13 +12,15 @@ use crate::planner::{Piece, Planner};
 use pkm_kins::{Kinematics, maths::sqrt};
 
 /// Change of the strips from node to node, in shares of the limits.
-const CHANGE: f64 = 0.01;
+const CHANGE: f64 = 0.007;
 /// However fast the strips change, nodes are no closer than this many to a servo period at full speed.
 const NODES_PER_PERIOD: f64 = 16.0;
 /// The speed is held so low that no more than about twice this many nodes are passed in a servo period.
 const NODES_PER_TICK: usize = 64;
 /// Nodes added in one go: bounds the work of a tick.
 const BATCH: usize = NODES_PER_TICK;
+/// The look-ahead plans at least so many more nodes at a time.
+const STRETCH: usize = 4 * NODES_PER_TICK;
 /// Less room than this is not worth a walk.
 const WORTH: usize = 16;
 
@@ -67,9 +69,9 @@ pub(crate) struct Grid<const R: usize> {
     pub(crate) s: f64,
     step: f64,
     last: Option<Sample<R>>,
-    /// Nodes at the end that the look-ahead has not seen.
-    pending: usize,
-    /// Nodes the last look-ahead computed.
+    /// Nodes from the front on that the look-ahead has planned; the last of them as a stop.
+    pub(crate) planned: usize,
+    /// How many of them the last pass had to plan again.
     depth: usize,
     /// As far as this (the nodes' `distance`) nothing depends on where the queue ends.
     pub(crate) settled: f64,
@@ -82,7 +84,7 @@ impl<const R: usize> Grid<R> {
             s: 0.0,
             step: f64::INFINITY,
             last: None,
-            pending: 0,
+            planned: 0,
             depth: 0,
             settled: f64::NEG_INFINITY,
         }
@@ -95,16 +97,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         if let Some(fault) = self.fault {
             return Err(fault);
         }
-        if !self.is_short() && self.nodes.len() + WORTH > NODES {
-            return Ok(());
-        }
-        let result = self.cut(BATCH);
-        // What the machine comes to soon must be final. Beyond that a pass waits until it is worth its price.
-        let soon = self.nodes.get(2 * NODES_PER_TICK).or(self.nodes.back()).map_or(0.0, |node| node.distance);
-        let hurry = !(self.grid.settled >= soon);
-        if self.grid.pending > 0 && (hurry || 4 * self.grid.pending >= self.grid.depth) {
-            self.look_ahead(self.nodes.len().saturating_sub(self.grid.pending));
-        }
+        let worth = self.is_short() || self.nodes.len() + WORTH <= NODES;
+        let result = if worth { self.cut(BATCH) } else { Ok(()) };
+        self.look_ahead();
         if let Err(fault) = result {
             self.fault = Some(fault);
         }
@@ -119,26 +114,25 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn cut(&mut self, budget: usize) -> Result<(), PlanError> {
         let target = (self.nodes.len() + budget).min(NODES);
         // Every turn adds a node or goes on to the next piece, of which there are at most PIECES.
-        while self.nodes.len() < target {
-            let Some(&piece) = self.piece(self.grid.piece) else { break };
+        for _ in 0..budget + PIECES {
+            if self.nodes.len() >= target {
+                break;
+            }
+            let Some(&Piece { to, open, .. }) = self.piece(self.grid.piece) else { break };
             if self.nodes.is_empty() {
-                self.first_node(&piece)?;
-            } else if self.grid.s < piece.to {
-                self.march(&piece)?;
-            } else if piece.open || !self.next_piece(&piece)? {
+                self.first_node()?;
+            } else if self.grid.s < to {
+                self.march()?;
+            } else if open || !self.next_piece()? {
                 break;
             }
         }
         Ok(())
     }
 
-    fn sample(&mut self, piece: &Piece, s: f64) -> Result<Sample<R>, PlanError> {
-        self.work.samples += 1;
-        self.limits.sample(&self.kinematics, &piece.geometry, s, piece.feed, piece.span)
-    }
-
-    fn first_node(&mut self, piece: &Piece) -> Result<(), PlanError> {
-        let sample = self.sample(piece, piece.from)?;
+    fn first_node(&mut self) -> Result<(), PlanError> {
+        let Some(piece) = self.piece(self.grid.piece) else { return Ok(()) };
+        let sample = self.limits.sample(&self.kinematics, piece, piece.from)?;
         let node = Node {
             piece: self.grid.piece,
             s: piece.from,
@@ -153,9 +147,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             right: sample.rows,
             distance: 0.0,
         };
-        self.grid.s = piece.from;
+        self.grid.s = node.s;
         self.grid.step = f64::INFINITY;
         self.grid.last = Some(sample);
+        self.work.samples += 1;
         self.add(node);
         Ok(())
     }
@@ -163,44 +158,45 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn add(&mut self, node: Node<R>) {
         // `cut` goes on only while there is room.
         let _ = self.nodes.push_back(node);
-        self.grid.pending += 1;
         self.work.nodes += 1;
     }
 
     /// The end of a piece: what begins here joins the last node. False if nothing follows yet.
-    fn next_piece(&mut self, ended: &Piece) -> Result<bool, PlanError> {
+    fn next_piece(&mut self) -> Result<bool, PlanError> {
         let number = self.grid.piece + 1;
-        let Some(&next) = self.piece(number) else { return Ok(false) };
+        let stop = self.piece(self.grid.piece).is_some_and(|ended| ended.stop);
+        let Some(next) = self.piece(number) else { return Ok(false) };
+        let (from, rapid, dwell_ns) = (next.from, next.rapid, next.dwell_ns);
         let still = matches!(next.geometry, Geometry::Hold(_));
-        let sample = if still { None } else { Some(self.sample(&next, next.from)?) };
+        let sample = if still { None } else { Some(self.limits.sample(&self.kinematics, next, from)?) };
         let Some(tail) = self.nodes.back_mut() else { return Ok(false) };
-        tail.stop |= ended.stop || still;
-        tail.dwell_ns += next.dwell_ns;
+        tail.stop |= stop || still;
+        tail.dwell_ns += dwell_ns;
         if let Some(sample) = sample {
             tail.right = sample.rows;
             tail.piece = number;
-            tail.s = next.from;
+            tail.s = from;
             tail.hard = tail.hard.min(sample.hard);
             tail.feed = tail.feed.min(sample.feed);
-            tail.rapid |= next.rapid;
+            tail.rapid |= rapid;
             self.grid.last = Some(sample);
+            self.work.samples += 1;
         }
         self.grid.piece = number;
-        self.grid.s = next.from;
+        self.grid.s = from;
         Ok(true)
     }
 
     /// One interval further along a piece.
-    fn march(&mut self, piece: &Piece) -> Result<(), PlanError> {
+    fn march(&mut self) -> Result<(), PlanError> {
+        let index = self.grid.piece.wrapping_sub(self.first_piece) as usize;
+        let (Some(piece), Some(last)) = (self.pieces.get(index), &self.grid.last) else { return Ok(()) };
         let remaining = piece.to - self.grid.s;
-        let last = match self.grid.last {
-            Some(last) => last,
-            None => self.sample(piece, self.grid.s)?,
-        };
+        self.work.samples += 1;
         let guess = self.grid.step;
         let mut step = even(remaining, guess);
         let period = self.settings.servo_period_s;
-        let mut sample = self.sample(piece, self.grid.s + step)?;
+        let mut sample = self.limits.sample(&self.kinematics, piece, self.grid.s + step)?;
         let mut next_guess = guess;
         for _ in 0..60 {
             let scales = last.variation(&sample);
@@ -221,10 +217,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 break;
             }
             step = shorter;
-            sample = self.sample(piece, self.grid.s + step)?;
+            self.work.samples += 1;
+            sample = self.limits.sample(&self.kinematics, piece, self.grid.s + step)?;
         }
         let at_end = step >= remaining;
-        let between = self.limits.between(&last, &sample, step, piece, self.grid.s)?;
+        let between = self.limits.between(last, &sample, step, piece, self.grid.s)?;
         let s = if at_end { piece.to } else { self.grid.s + step };
         let number = self.grid.piece;
         let Some(tail) = self.nodes.back_mut() else { return Ok(()) };
@@ -259,28 +256,52 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         Ok(())
     }
 
-    /// The backward pass. `known` nodes were planned before; the pass ends where nothing changes any more.
-    pub(crate) fn look_ahead(&mut self, known: usize) {
+    /// Plans as far ahead as what the machine comes to soon depends on; the rest waits.
+    pub(crate) fn look_ahead(&mut self) {
+        // Every turn plans a stretch more.
+        for _ in 0..NODES {
+            let soon = self.nodes.get(2 * NODES_PER_TICK).or(self.nodes.back());
+            if self.grid.planned >= self.nodes.len()
+                || soon.is_none_or(|node| self.grid.settled >= node.distance)
+            {
+                return;
+            }
+            let known = self.grid.planned;
+            self.pass(known, (known + self.grid.depth.max(STRETCH)).min(self.nodes.len()));
+        }
+    }
+
+    /// The caps have changed: what was planned is void.
+    pub(crate) fn look_ahead_anew(&mut self) {
+        self.grid.planned = 0;
+        self.grid.settled = f64::NEG_INFINITY;
+        self.look_ahead();
+    }
+
+    /// The backward pass, from a stop at the last of `end` nodes to where nothing changes any more; `known` nodes were
+    /// planned before.
+    fn pass(&mut self, known: usize, end: usize) {
         let rows = self.limits.rows();
         let (feed, rapid) = self.executor.overrides();
-        if let Some(tail) = self.nodes.back_mut() {
-            tail.entry = 0.0;
+        let mut next = end.wrapping_sub(1);
+        if let Some(last) = self.nodes.get_mut(next) {
+            last.entry = 0.0;
         }
-        self.grid.pending = 0;
+        self.grid.planned = end;
         self.grid.depth = 0;
-        self.grid.settled = f64::NEG_INFINITY;
-        for i in (1..self.nodes.len().saturating_sub(1)).rev() {
-            let (Some(node), Some(next)) = (self.nodes.get(i), self.nodes.get(i + 1)) else { return };
+        while next > 1 {
+            let i = next - 1;
+            let (Some(node), Some(after)) = (self.nodes.get(i), self.nodes.get(next)) else { return };
             let cap = node.cap(feed, rapid).min(FASTEST);
             let entry = if cap > 0.0 {
-                fastest_entry(&node.right, &next.left, rows, node.length, cap, next.entry)
+                fastest_entry(&node.right, &after.left, rows, node.length, cap, after.entry)
             } else {
                 0.0
             };
             self.work.planned += 1;
-            self.grid.depth += 1;
+            self.grid.depth += usize::from(next < known);
             let Some(node) = self.nodes.get_mut(i) else { return };
-            let same = entry == node.entry && i + 1 < known;
+            let same = entry == node.entry && next < known;
             node.entry = entry;
             // At its cap a node asks nothing of what follows; and one that a longer queue leaves as it is, no longer
             // queue will change (the entry is a concave function of the next one).
@@ -290,6 +311,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             if same {
                 return;
             }
+            next = i;
         }
     }
 }

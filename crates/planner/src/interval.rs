@@ -5,42 +5,29 @@
 
 use crate::limits::Rows;
 
-/// |a·x + b·x′| ≤ h, the form of every strip at either end of an interval of length h / 2.
-#[derive(Clone, Copy, Default)]
-struct Strip {
-    a: f64,
-    b: f64,
-}
-
-/// The strips of an interval, those of its left end first.
-struct Strips<const R: usize> {
-    ends: [[Strip; R]; 2],
+/// Calls `each` with a and b of every strip |a·x + b·x′| ≤ h, where h = 2 Δs.
+#[inline(always)]
+fn borders<const R: usize>(
+    left: &Rows<R>,
+    right: &Rows<R>,
     rows: usize,
     h: f64,
-}
-
-impl<const R: usize> Strips<R> {
-    fn new(left: &Rows<R>, right: &Rows<R>, rows: usize, length: f64) -> Self {
-        let h = 2.0 * length;
-        let mut ends = [[Strip::default(); R]; 2];
-        let [at_left, at_right] = &mut ends;
-        for ((strip, p), q) in at_left.iter_mut().zip(&left.first).zip(&left.second).take(rows) {
-            *strip = Strip { a: h * q - p, b: *p };
-        }
-        for ((strip, p), q) in at_right.iter_mut().zip(&right.first).zip(&right.second).take(rows) {
-            *strip = Strip { a: -p, b: p + h * q };
-        }
-        Self { ends, rows, h }
+    mut each: impl FnMut(f64, f64),
+) {
+    for (p, q) in left.first.iter().zip(&left.second).take(rows) {
+        each(h * q - p, *p);
     }
-
-    fn iter(&self) -> impl Iterator<Item = Strip> {
-        let [left, right] = &self.ends;
-        left.iter().take(self.rows).chain(right.iter().take(self.rows)).copied()
+    for (p, q) in right.first.iter().zip(&right.second).take(rows) {
+        each(-p, p + h * q);
     }
 }
 
-/// The largest x ≤ `cap` from which some x′ ≤ `next_cap` can be reached within all strips: a linear programme in two
-/// unknowns, solved by adding one strip at a time (Seidel). Cost: at most (2·rows)² / 2 steps, no iteration.
+/// The largest x ≤ `cap` from which some x′ ≤ `next_cap` can be reached within all strips.
+///
+/// The highest and the lowest x′ that the strips leave are a concave and a convex function of x, both straight in pieces. From
+/// an x where the lowest is above the highest, the x at which those two borders meet is nearer to the answer and
+/// not below it: Newton's method, which ends after finitely many steps here because the pieces are straight (two as a
+/// rule; each costs one walk over the strips).
 pub(crate) fn fastest_entry<const R: usize>(
     left: &Rows<R>,
     right: &Rows<R>,
@@ -49,44 +36,36 @@ pub(crate) fn fastest_entry<const R: usize>(
     cap: f64,
     next_cap: f64,
 ) -> f64 {
-    let strips = Strips::new(left, right, rows, length);
-    let h = strips.h;
-    let (mut x, mut y) = (cap, next_cap);
-    for (k, strip) in strips.iter().enumerate() {
-        let value = strip.a * x + strip.b * y;
-        if value.abs() <= h * (1.0 + 1e-12) {
-            continue;
-        }
-        // The optimum moves onto this border, a x + b y = c; t runs along it.
-        let c = if value > 0.0 { h } else { -h };
-        let along_x = strip.b.abs() >= strip.a.abs();
-        // (x, y) = (x0 + dx t, y0 + dy t)
-        let (x0, dx, y0, dy) = if along_x {
-            (0.0, 1.0, c / strip.b, -strip.a / strip.b)
-        } else {
-            (c / strip.a, -strip.b / strip.a, 0.0, 1.0)
-        };
-        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-        // min ≤ base + slope·t ≤ max
-        let mut clip = |slope: f64, base: f64, min: f64, max: f64| {
-            if slope > 0.0 {
-                high = high.min((max - base) / slope);
-                low = low.max((min - base) / slope);
-            } else if slope < 0.0 {
-                high = high.min((min - base) / slope);
-                low = low.max((max - base) / slope);
+    let h = 2.0 * length;
+    let mut x = cap;
+    // Every step leaves at least one of the 4·rows + 2 borders behind for good.
+    for _ in 0..4 * R + 2 {
+        // Highest and lowest x′ at x, and where the same borders are at 0.
+        let (mut low, mut high) = (0.0, next_cap);
+        let (mut low_at_0, mut high_at_0) = (0.0, next_cap);
+        let mut upright = f64::INFINITY;
+        borders(left, right, rows, h, |a, b| {
+            if b == 0.0 {
+                upright = upright.min(h / a.abs());
+                return;
             }
-        };
-        clip(dx, x0, 0.0, cap);
-        clip(dy, y0, 0.0, next_cap);
-        for earlier in strips.iter().take(k) {
-            clip(earlier.a * dx + earlier.b * dy, earlier.a * x0 + earlier.b * y0, -h, h);
+            let part = 1.0 / b;
+            let (middle, half) = (-a * x * part, h * part.abs());
+            if middle - half > low {
+                (low, low_at_0) = (middle - half, -half);
+            }
+            if middle + half < high {
+                (high, high_at_0) = (middle + half, half);
+            }
+        });
+        // The gap between the two is open at 0 and, where it is closed at x, closes in between.
+        let (gap, gap_at_0) = (high - low, high_at_0 - low_at_0);
+        let next = if gap >= 0.0 { x } else { x * (gap_at_0 / (gap_at_0 - gap)) }.min(upright);
+        // What is left of the way is rounding.
+        if !(next < x * (1.0 - 1e-14)) {
+            return x.min(next);
         }
-        let best = if dx >= 0.0 { high } else { low };
-        // Rounding may cross the bounds by an ulp; never leave the box.
-        let t = if low <= high { best } else { 0.5 * (low + high) };
-        x = (x0 + dx * t).clamp(0.0, cap);
-        y = (y0 + dy * t).clamp(0.0, next_cap);
+        x = next.max(0.0);
     }
     x
 }
@@ -103,19 +82,16 @@ pub(crate) fn exits<const R: usize>(
     // Where a joint's q′ passes zero, b is all rounding and so is the room at the limit: without a little slack their
     // quotient is anything.
     const SLACK: f64 = 1e-9;
-    let strips = Strips::new(left, right, rows, length);
-    let h = strips.h * (1.0 + SLACK);
     let (mut low, mut high) = (0.0_f64, f64::INFINITY);
-    for strip in strips.iter() {
-        let at = strip.a * x;
-        if strip.b > 0.0 {
-            high = high.min((h - at) / strip.b);
-            low = low.max((-h - at) / strip.b);
-        } else if strip.b < 0.0 {
-            high = high.min((-h - at) / strip.b);
-            low = low.max((h - at) / strip.b);
+    let h = 2.0 * length;
+    borders(left, right, rows, h, |a, b| {
+        if b != 0.0 {
+            let part = 1.0 / b;
+            let (middle, half) = (-a * x * part, h * (1.0 + SLACK) * part.abs());
+            high = high.min(middle + half);
+            low = low.max(middle - half);
         }
-    }
+    });
     (low, high)
 }
 
@@ -170,15 +146,21 @@ mod tests {
             for k in 0..=400 {
                 let y = next_cap * f64::from(k) / 400.0;
                 let (mut lo, mut hi) = (0.0_f64, cap);
-                for strip in Strips::new(&rows[0], &rows[1], 3, length).iter() {
-                    for sign in [1.0, -1.0] {
-                        let (a, room) = (sign * strip.a, 2.0 * length - sign * strip.b * y);
-                        if a > 0.0 {
-                            hi = hi.min(room / a);
-                        } else if a < 0.0 {
-                            lo = lo.max(room / a);
-                        } else if room < 0.0 {
-                            lo = f64::INFINITY;
+                let h = 2.0 * length;
+                for (end, side) in rows.iter().enumerate() {
+                    for (p, q) in side.first.iter().zip(&side.second) {
+                        // |p s̈ + q x| ≤ 1 (with x′ at the far end), as a·x + room.
+                        let (a, rest) =
+                            if end == 0 { (q - p / h, p / h * y) } else { (-p / h, (p / h + q) * y) };
+                        for sign in [1.0, -1.0] {
+                            let (a, room) = (sign * a, 1.0 - sign * rest);
+                            if a > 0.0 {
+                                hi = hi.min(room / a);
+                            } else if a < 0.0 {
+                                lo = lo.max(room / a);
+                            } else if room < 0.0 {
+                                lo = f64::INFINITY;
+                            }
                         }
                     }
                 }

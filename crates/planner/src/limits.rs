@@ -4,9 +4,9 @@
 //! x = ṡ², its speed is |q′|√x and its acceleration q′ s̈ + q″ x. Rows are stored divided by their acceleration
 //! limit, so each asks for |d₁ s̈ + d₂ x| ≤ 1. (Bobrow, Dubowsky, Gibson 1985; Pham & Pham, TOPP-RA, 2018.)
 
-use crate::path::{FeedGroup, Geometry, feed_length};
+use crate::path::{FeedGroup, feed_length};
+use crate::planner::Piece;
 use crate::{PlanError, PlanErrorKind};
-use pkm_canon::Span;
 use pkm_kins::{Axis, InverseError, JointRange, Joints, Kinematics, MAX_JOINTS, Pose};
 
 /// Plans are made to this share of every limit, so that what happens between two nodes (measured: 3e-4 more than at
@@ -135,14 +135,12 @@ impl<const R: usize> Limits<R> {
     pub(crate) fn sample<K: Kinematics>(
         &self,
         kinematics: &K,
-        geometry: &Geometry,
+        piece: &Piece,
         s: f64,
-        feed: Feed,
-        span: Span,
     ) -> Result<Sample<R>, PlanError> {
-        let point = geometry.at(s);
+        let point = piece.geometry.at(s);
         let pose = Pose::from_array(point.position);
-        let fail = |kind| PlanError { kind, span, pose };
+        let fail = |kind| PlanError { kind, span: piece.span, pose };
         let motion = kinematics
             .motion(&pose, &Pose::from_array(point.first), &Pose::from_array(point.second))
             .map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
@@ -159,7 +157,7 @@ impl<const R: usize> Limits<R> {
             speed: [0.0; R],
             position: [0.0; R],
             hard: FASTEST,
-            feed: feed.cap(&point.first),
+            feed: piece.feed.cap(&point.first),
         };
         let joint_rows =
             self.joints.iter().zip(&motion.position).zip(motion.velocity.iter().zip(&motion.acceleration));
@@ -207,7 +205,7 @@ impl<const R: usize> Limits<R> {
         a: &Sample<R>,
         b: &Sample<R>,
         length: f64,
-        piece: &crate::planner::Piece,
+        piece: &Piece,
         s: f64,
     ) -> Result<f64, PlanError> {
         let mut cap = a.hard.min(b.hard);
