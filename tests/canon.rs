@@ -124,3 +124,51 @@ fn a_damaged_parameter_file_is_refused_by_name() {
     }
     assert_eq!(pkm(&["canon", "-", "--parameters", folder.path().to_str().unwrap()]).status, 2);
 }
+
+#[test]
+fn motion9_is_motion_alone_in_mm() {
+    let axes = ["canon", "-", "--format", "motion9", "--axes", "XYZABCUVW"];
+    let cases: [(&[u8], &str); 3] = [
+        (
+            b"G20 (the feed counts from the next block)\nF10\nG1 X1 A90 U-2\nG18 G2 X2 I0.5 P2\nM2\n",
+            "2 SET_FEED_RATE(254.000000)\n\
+             3 STRAIGHT_FEED(25.400000, 0.000000, 0.000000, 90.000000, 0.000000, 0.000000, -50.800000, 0.000000, 0.000000)\n\
+             4 SELECT_PLANE(XZ)\n\
+             4 ARC_FEED(0.000000, 50.800000, 0.000000, 38.100000, -2, 0.000000, 90.000000, 0.000000, 0.000000, \
+             -50.800000, 0.000000, 0.000000)\n",
+        ),
+        (
+            b"G10 L2 P2 X1 R30\nG55\nG92 Y2\nG4 P0.25\n(MSG,hello)\nM2\n",
+            "2 SET_G5X_OFFSET(2, 1.000000, 0.000000, 0.000000, 0.000000, 0.000000, 0.000000, 0.000000, 0.000000, 0.000000)\n\
+             2 SET_G92_OFFSET(0.000000, 0.000000, 0.000000, 0.000000, 0.000000, 0.000000, 0.000000, 0.000000, 0.000000)\n\
+             2 SET_XY_ROTATION(30.000000)\n\
+             3 SET_G92_OFFSET(0.000000, -1.500000, ",
+        ),
+        (
+            b"o1 repeat [2]\nG91 G0 Z1\no1 endrepeat\nG77\n",
+            "2 STRAIGHT_TRAVERSE(0.000000, 0.000000, 1.000000, ",
+        ),
+    ];
+    for (program, expected) in cases {
+        let run = pkm_with_input(&axes, program);
+        assert!(run.stdout.starts_with(expected), "{}\n{expected}", run.stdout);
+    }
+    let dwell = pkm_with_input(&axes, cases[1].0).stdout;
+    assert!(dwell.contains("4 DWELL(0.250000)\n5 MESSAGE(\"hello\")\n"), "{dwell}");
+    assert!(!dwell.contains("PROGRAM_END") && !dwell.contains("\n0 "), "{dwell}");
+}
+
+#[test]
+fn json_holds_every_command_and_the_diagnostics() {
+    let run = pkm_with_input(&["canon", "-", "--format", "json"], b"N7 G0 X[1/3]\n(a \"quote\")\nG77\n");
+    assert_eq!((run.status, run.stderr.as_str()), (1, ""));
+    let lines = run.json_lines();
+    let find = |name: &str| lines.iter().find(|line| line["command"] == name).unwrap();
+    let traverse = find("STRAIGHT_TRAVERSE");
+    assert_eq!(traverse["arguments"]["x"], 1.0 / 3.0);
+    assert_eq!((&traverse["line"], &traverse["n"], &traverse["schema"]), (&1.into(), &"7".into(), &1.into()));
+    assert_eq!(find("COMMENT")["arguments"]["text"], "a \"quote\"");
+    let diagnostic = lines.iter().find_map(|line| line.get("diagnostic")).unwrap();
+    assert_eq!((&diagnostic["code"], &diagnostic["line"]), (&"g-unknown".into(), &3.into()));
+    assert_eq!(lines[0]["sequence"], 1);
+}

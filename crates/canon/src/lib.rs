@@ -13,10 +13,12 @@ mod command;
 mod decimal;
 #[cfg(feature = "alloc")]
 pub mod diagnostic;
+mod motion9;
 mod span;
 pub mod text;
 mod text_bytes;
 
 pub use command::*;
+pub use motion9::Motion9Writer;
 pub use span::{FileId, Span};
 pub use text_bytes::Text;

@@ -114,31 +114,31 @@ impl<O: LineOutput> CanonSink for TextWriter<O> {
 const NO_NUMBER: &[u8] = b"N..... ";
 
 /// A bounded line; what does not fit is cut.
-struct Buffer<const ROOM: usize = LINE_ROOM> {
+pub(crate) struct Buffer<const ROOM: usize = LINE_ROOM> {
     bytes: [u8; ROOM],
     length: usize,
 }
 
 impl<const ROOM: usize> Buffer<ROOM> {
-    const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { bytes: [0; ROOM], length: 0 }
     }
 
-    fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.length = 0;
     }
 
-    fn as_bytes(&self) -> &[u8] {
+    pub(crate) fn as_bytes(&self) -> &[u8] {
         &self.bytes[..self.length]
     }
 
-    fn put(&mut self, bytes: &[u8]) {
+    pub(crate) fn put(&mut self, bytes: &[u8]) {
         let count = bytes.len().min(ROOM - self.length);
         self.bytes[self.length..self.length + count].copy_from_slice(&bytes[..count]);
         self.length += count;
     }
 
-    fn integer(&mut self, value: i64) {
+    pub(crate) fn integer(&mut self, value: i64) {
         if value < 0 {
             self.put(b"-");
         }
@@ -146,7 +146,7 @@ impl<const ROOM: usize> Buffer<ROOM> {
     }
 
     /// Right-aligned in `width` places.
-    fn padded(&mut self, mut value: u64, width: usize) {
+    pub(crate) fn padded(&mut self, mut value: u64, width: usize) {
         let mut digits = [b' '; 20];
         let mut start = digits.len();
         loop {
@@ -160,7 +160,7 @@ impl<const ROOM: usize> Buffer<ROOM> {
         self.put(&digits[start.min(digits.len() - width)..]);
     }
 
-    fn number(&mut self, value: f64, decimals: u32) {
+    pub(crate) fn number(&mut self, value: f64, decimals: u32) {
         self.put(Decimal::new(value, decimals).as_bytes());
     }
 

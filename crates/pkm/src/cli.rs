@@ -155,6 +155,9 @@ pub(crate) struct Plan {
 pub(crate) struct Canon {
     /// G-code program; `-` is standard input
     pub program: PathBuf,
+    /// How the commands are printed
+    #[arg(long, value_enum, default_value_t = CanonFormat::Rs274)]
+    pub format: CanonFormat,
     /// Write the commands to this file instead of standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
@@ -183,6 +186,17 @@ pub(crate) struct Canon {
     /// What to do after an error
     #[arg(long, value_enum, default_value_t = OnError::Stop)]
     pub on_error: OnError,
+}
+
+/// How canonical commands are printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CanonFormat {
+    /// LinuxCNC's text
+    Rs274,
+    /// Motion alone: line, command, nine axes, six decimals, mm; a metric machine
+    Motion9,
+    /// One JSON object a line, diagnostics included
+    Json,
 }
 
 /// Whose rules decide where versions differ.

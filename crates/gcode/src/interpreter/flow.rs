@@ -111,7 +111,8 @@ pub(crate) struct Flow {
     defining: bool,
     /// LinuxCNC forgets to end a `break` out of a while: the next do then runs only once.
     stale_break: bool,
-    /// LinuxCNC forgets to end a `continue` of a do: the next repeat then runs twice as often.
+    /// LinuxCNC forgets to end a `continue` of a do: the next repeat then runs twice as often,
+    /// and the next `break` out of a while only goes on with it.
     stale_continue: bool,
     text: LabelText,
 }
@@ -292,7 +293,16 @@ impl Interpreter {
             (Until::Branch, Some(Keyword::Else | Keyword::Endif)) | (Until::Endif, Some(Keyword::Endif)) => {
                 true
             }
-            (Until::Endwhile, Some(Keyword::Endwhile)) | (Until::Endrepeat, Some(Keyword::Endrepeat)) => {
+            (Until::Endwhile, Some(Keyword::Endwhile)) => {
+                if core::mem::take(&mut self.flow.stale_continue)
+                    && let Some(Kind::While(begin)) =
+                        self.flow.find(skip.label).map(|construct| construct.kind)
+                {
+                    self.seek(source, begin)?;
+                }
+                true
+            }
+            (Until::Endrepeat, Some(Keyword::Endrepeat)) => {
                 self.flow.stale_continue = false;
                 true
             }

@@ -1,18 +1,22 @@
 //! `pkm canon`: canonical commands as LinuxCNC's `rs274 -g` prints them.
 
-use crate::cli::{Canon, Dialect, OnError};
+use crate::cli::{Canon, CanonFormat, Dialect, OnError};
 use crate::commands::parameters::Kept;
 use crate::commands::{program, tool_table};
 use crate::outcome::{Failure, Outcome};
 use crate::output;
-use crate::render::diagnostics::Messages;
+use crate::render::canon_json::JsonWriter;
+use crate::render::diagnostics::{Json, Messages};
 use atomic_write_file::AtomicWriteFile;
+use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::text::{Spelling, TextWriter};
+use pkm_canon::{CanonSink, Motion9Writer};
 use pkm_gcode::{
     FileSource, Interpreter, LineSource, MemorySource, Place, Settings, SourceError, ToolTable, canon_text_of,
 };
 use pkm_run::Program;
-use std::cell::Cell;
+use serde_json::json;
+use std::cell::{Cell, RefCell};
 use std::io::{self, BufWriter, Write, stdout};
 use std::path::{Path, PathBuf};
 
@@ -45,9 +49,11 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
         Program::Memory { text, .. } => Box::new(MemorySource::new(text)),
     };
     let mut failed = false;
-    let report = |error: &pkm_gcode::Error, line: &[u8]| {
+    let report = |diagnostic: &Diagnostic, line: &[u8]| {
         failed = true;
-        messages.print_plainly(&error.to_diagnostic(&name, line), line);
+        if arguments.format != CanonFormat::Json {
+            messages.print_plainly(diagnostic, line);
+        }
         arguments.on_error == OnError::Continue
     };
     match &arguments.output {
@@ -83,7 +89,11 @@ fn settings(arguments: &Canon) -> Settings {
             Dialect::Pkm => pkm_gcode::Dialect::Pkm,
         },
         axes: arguments.axes,
-        machine_units_per_mm: if arguments.mm { 1.0 } else { rs274.machine_units_per_mm },
+        machine_units_per_mm: if arguments.mm || arguments.format == CanonFormat::Motion9 {
+            1.0
+        } else {
+            rs274.machine_units_per_mm
+        },
         block_delete: arguments.block_delete,
         ..rs274
     }
@@ -95,24 +105,40 @@ fn print<W: Write>(
     interpreter: &mut Interpreter,
     source: &mut dyn LineSource,
     mut writer: W,
-    mut report: impl FnMut(&pkm_gcode::Error, &[u8]) -> bool,
+    mut report: impl FnMut(&Diagnostic, &[u8]) -> bool,
 ) -> io::Result<W> {
     let spelling = match arguments.dialect {
         Dialect::LinuxCnc29 | Dialect::Pkm => Spelling::V2_9,
         Dialect::LinuxCnc210 => Spelling::V2_10,
     };
+    let name = arguments.program.display().to_string();
     let stop = Cell::new(false);
-    let mut error = None;
-    let mut line = |bytes: &[u8]| {
-        if error.is_none() {
-            error = writer.write_all(bytes).err();
-            stop.set(error.is_some());
+    let error = RefCell::new(None);
+    let output = RefCell::new(&mut writer);
+    let line = |bytes: &[u8]| {
+        if !stop.get()
+            && let Err(failure) = output.borrow_mut().write_all(bytes)
+        {
+            error.replace(Some(failure));
+            stop.set(true);
         }
     };
-    let mut text = TextWriter::new(&mut line, spelling);
+    let mut sink: Box<dyn CanonSink> = match arguments.format {
+        CanonFormat::Rs274 => Box::new(TextWriter::new(line, spelling)),
+        CanonFormat::Motion9 => Box::new(Motion9Writer::new(line)),
+        CanonFormat::Json => Box::new(JsonWriter::new(line, &name)),
+    };
     let mut source = Stoppable { source, stop: &stop };
-    canon_text_of(interpreter, &mut source, &mut text, |error, line| !stop.get() && report(error, line));
-    match error {
+    canon_text_of(interpreter, &mut source, &mut *sink, |error, text| {
+        let diagnostic = error.to_diagnostic(&name, text);
+        if arguments.format == CanonFormat::Json {
+            let object = json!({ "schema": pkm_run::SCHEMA, "diagnostic": Json::from(&diagnostic) });
+            line(format!("{object}\n").as_bytes());
+        }
+        !stop.get() && report(&diagnostic, text)
+    });
+    drop(sink);
+    match error.take() {
         Some(error) => Err(error),
         None => {
             writer.flush()?;

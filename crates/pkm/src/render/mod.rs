@@ -1,4 +1,5 @@
 //! How results and messages look.
 
+pub(crate) mod canon_json;
 pub(crate) mod diagnostics;
 pub(crate) mod summary;
