@@ -11,9 +11,10 @@ fn count() -> u64 {
     std::env::var("PKM_ORACLE_COUNT").ok().and_then(|n| n.parse().ok()).unwrap_or(20)
 }
 
-/// LinuxCNC's arcs under cutter compensation whose neighbour meets them at an inside corner: where the two offset curves
-/// meet, and which of the two blocks is refused, is not reproduced in every case.
+/// `rs274` refuses an inside corner beside a compensated arc (it says so) where pkm goes on, or one block earlier or later.
 const INSIDE_CORNER: &str = "an inside corner between a compensated arc and its neighbour";
+/// A defect not yet understood: a corner of cutter compensation ends elsewhere, or only pkm refuses it.
+const CORNER_END: &str = "where a compensated corner ends, cause not yet found";
 /// After a `continue` that ended a do loop, LinuxCNC treats one of the following loops as still continuing; which one is
 /// reproduced for the next repeat, while and do, but not through every mixture of them.
 const STALE_CONTINUE: &str = "a loop after a `continue` that ended a do loop";
@@ -24,11 +25,11 @@ const KNOWN: [(Flavour, u64, &str, &str); 9] = [
     (Flavour::Flow, 112, "canonical line 20\n", STALE_CONTINUE),
     (Flavour::Flow, 139, "canonical line 21\n", STALE_CONTINUE),
     (Flavour::Compensation, 13, "canonical line 19\n", INSIDE_CORNER),
-    (Flavour::Compensation, 81, "canonical line 52\n", INSIDE_CORNER),
-    (Flavour::Compensation, 104, "canonical line 11\n", INSIDE_CORNER),
+    (Flavour::Compensation, 81, "canonical line 52\n", CORNER_END),
+    (Flavour::Compensation, 104, "canonical line 11\n", CORNER_END),
     (Flavour::Compensation, 106, "canonical line 11\n", INSIDE_CORNER),
     (Flavour::Compensation, 190, "canonical line 11\n", INSIDE_CORNER),
-    (Flavour::Compensation, 194, "canonical line 59\n", INSIDE_CORNER),
+    (Flavour::Compensation, 194, "canonical line 59\n", CORNER_END),
 ];
 
 #[test]
@@ -48,7 +49,10 @@ fn random_programs_agree_with_rs274() {
         }
         for seed in first..first + count() {
             let text = program(seed, flavour);
-            let Some(oracle) = rs274(text.as_bytes(), &directory) else { continue };
+            let Some(oracle) = rs274(text.as_bytes(), &directory) else {
+                eprintln!("{flavour:?} seed {seed} not compared: rs274 does not end");
+                continue;
+            };
             compared += 1;
             let known = KNOWN.iter().find(|known| (known.0, known.1) == (flavour, seed));
             match (difference(&oracle, &pkm(text.as_bytes())), known) {
