@@ -83,20 +83,20 @@ impl Executor {
 }
 
 impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Planner<K, R, PIECES, NODES> {
-    /// Feed override, 1 = 100 %, clamped to 0 to 2. NaN is refused: false, and nothing changes.
+    /// Feed override, 1 = 100 %, clamped to 0 to 2. What is not finite is refused: false, and nothing changes.
     pub fn set_feed_override(&mut self, factor: f64) -> bool {
         let rapid = self.executor.rapid_override;
         self.set_overrides(factor, rapid)
     }
 
-    /// Rapid override, 1 = 100 %, clamped to 0 to 1. NaN is refused: false, and nothing changes.
+    /// Rapid override, 1 = 100 %, clamped to 0 to 1. What is not finite is refused: false, and nothing changes.
     pub fn set_rapid_override(&mut self, factor: f64) -> bool {
         let feed = self.executor.feed_override;
         self.set_overrides(feed, factor)
     }
 
     fn set_overrides(&mut self, feed: f64, rapid: f64) -> bool {
-        if feed.is_nan() || rapid.is_nan() {
+        if !feed.is_finite() || !rapid.is_finite() {
             return false;
         }
         let (feed, rapid) = (feed.clamp(0.0, 2.0), rapid.clamp(0.0, 1.0));
@@ -146,9 +146,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             }
         }
         let mut state = if self.executor.dwells { State::Dwell } else { State::Moving };
+        let over = self.executor.abort && self.executor.at_rest();
         if self.executor.at_rest() {
-            if self.executor.abort {
-                self.clear();
+            if over {
                 state = State::Idle;
             } else if held {
                 state = State::Held;
@@ -156,7 +156,12 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 state = State::Idle;
             }
         }
-        self.publish(state)
+        let setpoint = self.publish(state);
+        if over {
+            // Only now: the last of the way is in this setpoint.
+            self.clear();
+        }
+        setpoint
     }
 
     /// A dwell takes whole servo periods; the last one may be cut short.

@@ -50,6 +50,8 @@ pub struct PlanError {
 pub enum PlanErrorKind {
     /// No joint positions, or too near a singularity.
     Unreachable(InverseError),
+    /// A feed that is not above 0: the move would never end.
+    NoFeed,
     /// A joint outside its travel.
     JointTravel {
         /// From 0.

@@ -7,7 +7,7 @@ use crate::executor::Executor;
 use crate::grid::{Grid, Node};
 use crate::limits::{Feed, Limits};
 use crate::path::{Blend, FeedGroup, Geometry, Tolerance, Vector, combine};
-use crate::{PlanError, path};
+use crate::{PlanError, PlanErrorKind, path};
 use heapless::Deque;
 use pkm_canon::Span;
 use pkm_kins::{Joints, Kinematics, Pose};
@@ -166,7 +166,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     /// The start pose is out of reach or out of travel.
     pub fn new(kinematics: K, limits: Limits<R>, settings: Settings, start: Pose) -> Result<Self, PlanError> {
         let fail = |kind| PlanError { kind, span: Span::default(), pose: start };
-        let joints = kinematics.inverse(&start).map_err(|e| fail(crate::PlanErrorKind::Unreachable(e)))?;
+        let joints = kinematics.inverse(&start).map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
         limits.check_travel(&start, &joints).map_err(fail)?;
         Ok(Self {
             kinematics,
@@ -241,6 +241,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let length = next.geometry.length();
         if !(length > 0.0) {
             return Ok(motion);
+        }
+        if !(next.feed.speed > 0.0) {
+            let pose = Pose::from_array(next.geometry.at(0.0).position);
+            return Err(PushError::Plan(PlanError { kind: PlanErrorKind::NoFeed, span: next.span, pose }));
         }
         let from = self.join(&next);
         self.end = next.geometry.at(length).position;

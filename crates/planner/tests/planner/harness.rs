@@ -2,8 +2,8 @@
 
 use crate::catalogue::Case;
 use pkm_kins::{JointRange, Joints, Pose};
-use pkm_planner::path::{Arc, FeedGroup, Geometry, Line, Vector};
-use pkm_planner::{Feed, JointLimits, Limits, Move, PathMode, Planner, PushError, Settings, State};
+use pkm_planner::path::{Arc, FeedGroup, Geometry, Line, Vector, feed_group};
+use pkm_planner::{Feed, JointLimits, Limits, Move, PathMode, Planner, PushError, Setpoint, Settings, State};
 
 pub(crate) type TestPlanner = Planner<pkm_kins::machine::Mechanism, 6, 2048, 2048>;
 
@@ -111,69 +111,105 @@ pub(crate) fn start(case: &Case) -> Pose {
 }
 
 pub(crate) fn to_move(case: &Case, (geometry, mode): (Geometry, PathMode)) -> Move {
+    let (from, to) = (geometry.at(0.0).position, geometry.at(geometry.length()).position);
+    let group = match geometry {
+        Geometry::Line(_) => feed_group(&std::array::from_fn(|i| to[i] - from[i])),
+        _ => FeedGroup::Xyz,
+    };
     Move {
         geometry,
-        feed: Feed { speed: case.feed_mm_s, group: FeedGroup::Xyz },
+        feed: Feed { speed: case.feed_mm_s, group },
         rapid: case.feed_mm_s.is_infinite(),
         mode,
         span: Default::default(),
     }
 }
 
-pub(crate) fn planner(case: &Case, sampling: Sampling) -> TestPlanner {
-    let settings =
-        Settings { servo_period_s: sampling.period_s, substeps: sampling.substeps, settle_periods: 0 };
-    TestPlanner::new(case.mechanism, limits(case), settings, start(case)).unwrap()
+/// A planner, what is fed to it and what is seen of it.
+pub(crate) struct Rig<'a> {
+    pub(crate) planner: Box<TestPlanner>,
+    case: &'a Case,
+    /// Moves pushed.
+    pushed: usize,
+    differences: Differences<'a>,
+    path_error_mm: f64,
+    pub(crate) ticks: u64,
 }
 
-pub(crate) fn drive(case: &Case, sampling: Sampling, disturbance: Disturbance, one_per_tick: bool) -> Trace {
-    let mut planner = planner(case, sampling);
-    let mut differences = Differences::new(case, sampling.step_s(), planner.setpoint().joints);
-    let mut queue = case.moves.iter();
-    let mut next = queue.next();
-    let (mut ticks, mut path_error_mm) = (0u64, 0.0_f64);
-    let mut seed = 0x9e37_79b9_7f4a_7c15;
-    let per_ms = (1e-3 / sampling.step_s()).round() as u64;
-    loop {
-        while let Some(piece) = next {
-            match planner.push(to_move(case, *piece)) {
-                Ok(_) => next = queue.next(),
+impl<'a> Rig<'a> {
+    pub(crate) fn new(case: &'a Case, sampling: Sampling) -> Self {
+        let Sampling { period_s, substeps } = sampling;
+        let settings = Settings { servo_period_s: period_s, substeps, settle_periods: 0 };
+        let planner = TestPlanner::new(case.mechanism, limits(case), settings, start(case)).unwrap();
+        let differences = Differences::new(case, sampling.step_s(), planner.setpoint().joints);
+        Self { planner: Box::new(planner), case, pushed: 0, differences, path_error_mm: 0.0, ticks: 0 }
+    }
+
+    /// Pushes while there is room, or one move only.
+    pub(crate) fn feed(&mut self, one: bool) {
+        while let Some(piece) = self.case.moves.get(self.pushed) {
+            match self.planner.push(to_move(self.case, *piece)) {
+                Ok(_) => self.pushed += 1,
                 Err(PushError::Full) => break,
                 Err(PushError::Plan(e)) => panic!("{e:?}"),
             }
-            if next.is_none() {
-                planner.finish();
+            if self.is_fed() {
+                self.planner.finish();
             }
-            if one_per_tick {
+            if one {
                 break;
             }
         }
+    }
+
+    pub(crate) fn is_fed(&self) -> bool {
+        self.pushed == self.case.moves.len()
+    }
+
+    pub(crate) fn tick(&mut self) -> Setpoint {
+        let setpoint = self.planner.tick().unwrap();
+        self.ticks += 1;
+        assert!(self.ticks < 1_000_000, "stalls: {setpoint:?}\n{:?}", self.planner);
+        self.differences.push(setpoint.joints);
+        let off = off_path(self.case, setpoint.motion as usize, &setpoint.pose.to_array());
+        self.path_error_mm = self.path_error_mm.max(off);
+        setpoint
+    }
+
+    /// Worst joint velocity and acceleration in shares of the limits, and distance from the path in mm, so far.
+    pub(crate) fn worst(&self) -> [f64; 3] {
+        [self.differences.velocity, self.differences.acceleration, self.path_error_mm]
+    }
+}
+
+pub(crate) fn drive(case: &Case, sampling: Sampling, disturbance: Disturbance, one_per_tick: bool) -> Trace {
+    let mut rig = Rig::new(case, sampling);
+    let mut seed = 0x9e37_79b9_7f4a_7c15;
+    let per_ms = (1e-3 / sampling.step_s()).round() as u64;
+    loop {
+        rig.feed(one_per_tick);
         match disturbance {
             Disturbance::None => {}
             Disturbance::RandomOverride => {
                 if random(&mut seed).is_multiple_of(3 * per_ms) {
                     let factor = (random(&mut seed) % 121) as f64 / 100.0;
+                    let planner = &mut rig.planner;
                     assert!(planner.set_feed_override(factor) && planner.set_rapid_override(factor));
                 }
             }
-            Disturbance::HoldThirds => planner.hold(ticks / per_ms % 300 >= 200),
+            Disturbance::HoldThirds => rig.planner.hold(rig.ticks / per_ms % 300 >= 200),
         }
-        let setpoint = planner.tick().unwrap();
-        ticks += 1;
-        differences.push(setpoint.joints);
-        path_error_mm =
-            path_error_mm.max(off_path(case, setpoint.motion as usize, &setpoint.pose.to_array()));
-        if setpoint.state == State::Idle && next.is_none() {
+        if rig.tick().state == State::Idle && rig.is_fed() {
             break;
         }
-        assert!(ticks < 1_000_000, "stalls: {setpoint:?}\n{planner:?}");
     }
+    let [velocity, acceleration, path_error_mm] = rig.worst();
     Trace {
-        duration_s: (ticks - 1) as f64 * sampling.step_s(),
-        velocity: differences.velocity,
-        acceleration: differences.acceleration,
+        duration_s: (rig.ticks - 1) as f64 * sampling.step_s(),
+        velocity,
+        acceleration,
         path_error_mm,
-        end: planner.setpoint().pose.to_array(),
+        end: rig.planner.setpoint().pose.to_array(),
     }
 }
 

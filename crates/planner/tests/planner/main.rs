@@ -1,7 +1,9 @@
 //! Tests of the planner from outside: known cases, and random paths.
 #![allow(clippy::print_stdout)]
 
+mod bad_input;
 mod cases;
 mod catalogue;
 mod harness;
 mod random;
+mod runtime;

@@ -1,0 +1,240 @@
+//! Paths, limits and feeds that no program should have: an error with its place, or a correct run. Never NaN, never a
+//! stop that is not the program's.
+
+use crate::catalogue::{Case, blend, identity, moma, polyline, xyz};
+use crate::harness::{Disturbance, Rig, Sampling, TestPlanner, drive, limits, start, to_move, with_stack};
+use pkm_canon::Span;
+use pkm_kins::{Axis, JointRange};
+use pkm_planner::path::{Geometry, Line, Vector};
+use pkm_planner::{
+    AxisLimits, JointLimits, Limits, LimitsError, PathMode, PlanErrorKind, PushError, Settings, State,
+};
+
+const SETTINGS: Settings = Settings { servo_period_s: 1e-3, substeps: 1, settle_periods: 0 };
+const MODES: [PathMode; 3] = [PathMode::ExactStop, PathMode::ExactPath, PathMode::Blend(TOLERANCE)];
+const TOLERANCE: pkm_planner::path::Tolerance =
+    pkm_planner::path::Tolerance { length_mm: 0.01, angle_rad: 1e-3 };
+
+fn on_moma(points: &[Vector], mode: PathMode, feed_mm_s: f64) -> Case {
+    let moves = polyline(points, mode);
+    Case { mechanism: moma(), velocity: vec![100.0; 2], acceleration: vec![1000.0; 2], moves, feed_mm_s }
+}
+
+/// Runs to the end of the path within all limits; returns the seconds taken.
+fn clean(what: &str, case: &Case) -> f64 {
+    let trace = drive(case, Sampling::SERVO, Disturbance::None, false);
+    let goal = case.moves.last().unwrap().0;
+    let goal = goal.at(goal.length()).position;
+    assert!(trace.velocity <= 1.0 + 1e-6, "{what}: velocity {}", trace.velocity);
+    assert!(trace.acceleration <= 1.0 + 1e-6, "{what}: acceleration {}", trace.acceleration);
+    assert!(trace.end.iter().zip(goal).all(|(a, b)| (a - b).abs() < 1e-9), "{what}: ends at {:?}", trace.end);
+    trace.duration_s
+}
+
+#[test]
+fn limits_that_make_no_machine_are_refused() {
+    let range = JointRange { min: 0.0, max: 200.0 };
+    let good = JointLimits { range, max_velocity: 100.0, max_acceleration: 1000.0 };
+    assert!(Limits::<2>::new(&[good, good], &[], 0.0).is_ok());
+    for bad in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+        for joint in
+            [JointLimits { max_velocity: bad, ..good }, JointLimits { max_acceleration: bad, ..good }]
+        {
+            assert_eq!(Limits::<2>::new(&[good, joint], &[], 0.0).unwrap_err(), LimitsError::Joint(1));
+        }
+    }
+    for (min, max) in [(1.0, 1.0), (2.0, 1.0), (f64::NAN, 1.0), (0.0, f64::NAN)] {
+        let joint = JointLimits { range: JointRange { min, max }, ..good };
+        assert_eq!(Limits::<2>::new(&[joint, good], &[], 0.0).unwrap_err(), LimitsError::Joint(0));
+    }
+    let axis = |max_velocity, max_acceleration| AxisLimits {
+        axis: Axis::Y,
+        range: None,
+        max_velocity,
+        max_acceleration,
+    };
+    assert!(Limits::<2>::new(&[good], &[axis(f64::INFINITY, 5.0)], 0.0).is_ok());
+    for bad in [axis(0.0, 5.0), axis(5.0, -1.0), axis(f64::NAN, 5.0)] {
+        assert_eq!(Limits::<2>::new(&[good], &[bad], 0.0).unwrap_err(), LimitsError::Axis(Axis::Y));
+    }
+    let room = Limits::<2>::new(&[good, good], &[axis(1.0, 1.0)], 0.0);
+    assert_eq!(room.unwrap_err(), LimitsError::TooMany { rows: 3, room: 2 });
+}
+
+#[test]
+fn a_million_identical_points_are_no_motion() {
+    with_stack(|| {
+        let (a, b) = (xyz(0.0, -265.0, 0.0), xyz(10.0, -265.0, 0.0));
+        let case = on_moma(&[a, b], blend(0.01), 50.0);
+        let mut rig = Rig::new(&case, Sampling::SERVO);
+        let point = Geometry::Line(Line { start: a, direction: [0.0; 9], length: 0.0 });
+        for _ in 0..1_000_000 {
+            rig.planner.push(to_move(&case, (point, blend(0.01)))).unwrap();
+        }
+        assert!(rig.planner.is_idle());
+        assert!(Line::new(a, a).is_none());
+        let number = rig.planner.push(to_move(&case, case.moves[0])).unwrap();
+        assert_eq!(number, 1_000_000);
+        rig.planner.finish();
+        let mut ticks = 0;
+        while rig.planner.tick().unwrap().state != State::Idle && ticks < 1000 {
+            ticks += 1;
+        }
+        assert_eq!(rig.planner.setpoint().pose.to_array(), b);
+    });
+}
+
+#[test]
+fn a_feed_of_nothing_is_refused_with_its_place_and_a_boundless_one_is_held_by_the_joints() {
+    with_stack(|| {
+        let points = [xyz(-50.0, -270.0, 0.0), xyz(50.0, -270.0, 0.0)];
+        for speed in [0.0, -1.0, f64::NAN] {
+            let case = on_moma(&points, PathMode::ExactPath, speed);
+            let mut rig = Rig::new(&case, Sampling::SERVO);
+            let span = Span { line: 7, ..Span::default() };
+            let mut step = to_move(&case, case.moves[0]);
+            step.span = span;
+            match rig.planner.push(step) {
+                Err(PushError::Plan(error)) => {
+                    assert_eq!((error.kind, error.span), (PlanErrorKind::NoFeed, span));
+                }
+                other => panic!("F {speed}: {other:?}"),
+            }
+            assert!(rig.planner.is_idle());
+        }
+        let fast = clean("F1e9", &on_moma(&points, PathMode::ExactPath, 1e9));
+        let rapid = clean("rapid", &on_moma(&points, PathMode::ExactPath, f64::INFINITY));
+        assert!((fast - rapid).abs() <= 1e-3, "{fast} s and {rapid} s");
+    });
+}
+
+#[test]
+fn blocks_of_a_ten_millionth_of_a_millimetre_run() {
+    with_stack(|| {
+        for mode in MODES {
+            let points: Vec<Vector> = (0..=500)
+                .map(|k| {
+                    let t = 1e-7 * f64::from(k);
+                    // A millimetre before and after, so that they come at speed.
+                    let along = if k == 0 {
+                        -1.0
+                    } else if k == 500 {
+                        1.0
+                    } else {
+                        t
+                    };
+                    xyz(along, -265.0 + 3e-8 * f64::from(k % 2), 0.0)
+                })
+                .collect();
+            let seconds = clean("1e-7 mm", &on_moma(&points, mode, 20.0));
+            println!("{mode:?}: {seconds} s");
+            // Every block takes at least the servo period it stops in; blended ones take no time to speak of.
+            assert!(
+                seconds < if matches!(mode, PathMode::Blend(_)) { 0.4 } else { 2.0 },
+                "{mode:?}: {seconds} s"
+            );
+        }
+    });
+}
+
+/// On this line the link of slider 1 is at a right angle to its rail.
+fn singular(t: f64) -> Vector {
+    let (sin, cos) = (libm::sin(265.0_f64.to_radians()), libm::cos(265.0_f64.to_radians()));
+    xyz(-100.0 - 195.0 * sin + t * cos, 195.0 * cos + t * sin, 0.0)
+}
+
+#[test]
+fn a_path_along_a_singular_locus_ends_in_an_error_with_its_place() {
+    with_stack(|| {
+        for guard in [0.0, 1e-6, 0.05] {
+            for mode in MODES {
+                // From well inside up to the locus, then along it, then back.
+                let points = [xyz(0.0, -265.0, 0.0), singular(120.0), singular(90.0), xyz(0.0, -265.0, 0.0)];
+                let case = on_moma(&points, mode, f64::INFINITY);
+                let joints = [JointLimits {
+                    range: JointRange { min: -1000.0, max: 1000.0 },
+                    max_velocity: 100.0,
+                    max_acceleration: 1000.0,
+                }; 2];
+                let limits = Limits::new(&joints, &[], guard).unwrap();
+                let mut planner =
+                    Box::new(TestPlanner::new(case.mechanism, limits, SETTINGS, start(&case)).unwrap());
+                for (line, piece) in (1..).zip(&case.moves) {
+                    let mut step = to_move(&case, *piece);
+                    step.span = Span { line, ..Span::default() };
+                    let _ = planner.push(step);
+                }
+                planner.finish();
+                let mut ticks = 0;
+                let mut last = *planner.setpoint();
+                loop {
+                    let setpoint = planner.tick().unwrap();
+                    let numbers = setpoint.joints.iter().chain(&setpoint.joint_velocity);
+                    assert!(numbers.chain(&setpoint.pose.to_array()).all(|x| x.is_finite()), "{setpoint:?}");
+                    let rests = setpoint.joints == last.joints && ticks > 0;
+                    last = setpoint;
+                    if rests && planner.fault().is_some() {
+                        break;
+                    }
+                    ticks += 1;
+                    assert!(ticks < 20_000, "guard {guard}, {mode:?}: no error and no end: {planner:?}");
+                }
+                let fault = planner.fault().unwrap();
+                assert!(matches!(fault.kind, PlanErrorKind::Unreachable(_)), "{fault:?}");
+                assert!((1..=2).contains(&fault.span.line), "{fault:?}");
+                let place = fault.pose.to_array();
+                let goal = singular(120.0);
+                let far = pkm_kins::maths::hypot(place[0] - goal[0], place[1] - goal[1]);
+                assert!(far < 10.0, "guard {guard}, {mode:?}: {fault:?} is {far} mm away");
+            }
+        }
+    });
+}
+
+#[test]
+fn rotary_and_mixed_moves_hold_every_limit() {
+    with_stack(|| {
+        let axes = [Axis::X, Axis::Y, Axis::Z, Axis::A, Axis::B, Axis::C];
+        let pose = |x: f64, y: f64, z: f64, deg: [f64; 3]| {
+            let [a, b, c] = deg.map(f64::to_radians);
+            [x, y, z, a, b, c, 0.0, 0.0, 0.0]
+        };
+        let points = [
+            pose(0.0, 0.0, 0.0, [0.0, 0.0, 0.0]),
+            pose(0.0, 0.0, 0.0, [90.0, 0.0, 0.0]),
+            pose(0.0, 0.0, 0.0, [90.0, -45.0, 10.0]),
+            pose(30.0, 5.0, 0.0, [60.0, -45.0, 200.0]),
+            pose(30.0, 35.0, -5.0, [60.0, -45.0, 200.0]),
+            pose(30.0, 35.1, -5.0, [0.0, 0.0, 0.0]),
+            pose(0.0, 0.0, 0.0, [0.0, 0.0, 0.0]),
+        ];
+        let case = |mode, feed_mm_s| Case {
+            mechanism: identity(&axes),
+            velocity: vec![100.0, 100.0, 50.0, 3.0, 2.0, 6.0],
+            acceleration: vec![1000.0, 800.0, 300.0, 30.0, 20.0, 50.0],
+            moves: polyline(&points, mode),
+            feed_mm_s,
+        };
+        for feed in [f64::INFINITY, 20.0, 1.0] {
+            let [stop, path, blended] = MODES.map(|mode| clean("mixed", &case(mode, feed)));
+            println!("F {feed}: {stop} s, {path} s, {blended} s");
+            assert!(blended < stop && path <= stop + 1e-3, "{stop} s, {path} s, {blended} s");
+        }
+        // A quarter turn of A at 1 rad/s: 90° in π/2 s and 1/30 s to get there and as much to stop, in whole ticks.
+        let mut quarter = case(PathMode::ExactStop, 1.0);
+        quarter.moves.truncate(1);
+        let seconds = clean("quarter turn", &quarter);
+        let want = core::f64::consts::FRAC_PI_2 + 1.0 / 30.0;
+        assert!((seconds - want).abs() <= 1.1e-3, "{seconds} s, want {want} s");
+    });
+}
+
+#[test]
+fn a_start_out_of_reach_or_travel_is_refused() {
+    let case = on_moma(&[xyz(0.0, -265.0, 0.0), xyz(1.0, -265.0, 0.0)], PathMode::ExactStop, 1.0);
+    let far = pkm_kins::Pose::from_array(xyz(900.0, -265.0, 0.0));
+    with_stack(move || {
+        let refused = TestPlanner::new(case.mechanism, limits(&case), SETTINGS, far);
+        assert!(matches!(refused.map(|_| ()).unwrap_err().kind, PlanErrorKind::Unreachable(_)));
+    });
+}
