@@ -304,6 +304,15 @@ fn cost(cases: &[Known], plain: bool) {
     if plain {
         return;
     }
+    let kib = |bytes: usize| bytes / 1024;
+    println!(
+        "Memory with {PIECES} pieces and {NODES} nodes: {} KiB for 2 rows, {} for 3, {} for 6; with 64 and 512: {} KiB for 2, {} for 6",
+        kib(size_of::<Bench<2>>()),
+        kib(size_of::<Bench<3>>()),
+        kib(size_of::<Bench<6>>()),
+        kib(size_of::<Planner<Mechanism, 2, 64, 512>>()),
+        kib(size_of::<Planner<Mechanism, 6, 64, 512>>()),
+    );
     println!(
         "(reading the clock, taken off: {clock_ns:.0} ns; the first push fills the queue and is left out of the maxima)"
     );

@@ -258,7 +258,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// Plans as far ahead as what the machine comes to soon depends on; the rest waits.
     pub(crate) fn look_ahead(&mut self) {
-        // Every turn plans a stretch more.
+        // Every turn plans as much more as the last one had to plan again, so the turns about double: all in all no
+        // more than three times what the queue holds.
         for _ in 0..NODES {
             let soon = self.nodes.get(2 * NODES_PER_TICK).or(self.nodes.back());
             if self.grid.planned >= self.nodes.len()
@@ -266,8 +267,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             {
                 return;
             }
-            let known = self.grid.planned;
-            self.pass(known, (known + self.grid.depth.max(STRETCH)).min(self.nodes.len()));
+            let more = self.grid.depth.max(STRETCH);
+            self.pass(self.grid.planned, (self.grid.planned + more).min(self.nodes.len()));
         }
     }
 

@@ -40,6 +40,12 @@ pub(crate) fn fastest_entry<const R: usize>(
     let mut x = cap;
     // Every step leaves at least one of the 4·rows + 2 borders behind for good.
     for _ in 0..4 * R + 2 {
+        // As a rule the highest x′ asked for is the one.
+        let mut widest = 0.0_f64;
+        borders(left, right, rows, h, |a, b| widest = widest.max((a * x + b * next_cap).abs()));
+        if widest <= h * (1.0 + 1e-12) {
+            return x;
+        }
         // Highest and lowest x′ at x, and where the same borders are at 0.
         let (mut low, mut high) = (0.0, next_cap);
         let (mut low_at_0, mut high_at_0) = (0.0, next_cap);
