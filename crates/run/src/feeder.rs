@@ -239,6 +239,12 @@ impl<'a> Feeder<'a> {
 
     /// Interprets as far ahead as the planner has room.
     fn fill(&mut self) {
+        // A tick, too, can come upon a place that cannot be planned, when nothing is left to push.
+        if self.failure.is_none()
+            && let Some(fault) = self.planner.fault().copied()
+        {
+            self.fail(messages::plan(self.program, self.machine, &fault));
+        }
         while self.planner.has_room() && self.form_switch.is_none() {
             if let Some(code) = self.code {
                 if !self.planner.is_idle() || !self.given.is_multiple_of(self.substeps.into()) {
