@@ -105,6 +105,7 @@ pub(crate) fn plan(program: &Program, machine: &Machine, error: &PlanError) -> D
             };
             at(program, error.span, &inner.code().to_string(), Severity::Error, message, help)
         }
+        PlanErrorKind::NoFeed => feed_unset(program, error.span),
         _ => at(
             program,
             error.span,
@@ -168,8 +169,10 @@ pub(crate) fn too_near_singularity(
 }
 
 pub(crate) fn feed_unset(program: &Program, span: Span) -> Diagnostic {
-    let help = "give an F word before the first G1, G2 or G3";
-    at(program, span, "feed-zero", Severity::Error, "a feed move with no feed rate".to_owned(), help)
+    let message =
+        "a feed move with no feed rate: F is 0, or G95 counts turns of a spindle that does not turn";
+    let help = "give an F word (and start the spindle for G95) before the first G1, G2 or G3";
+    at(program, span, "feed-zero", Severity::Error, message.to_owned(), help)
 }
 
 /// The language knows it, the simulated machine does not.
