@@ -60,7 +60,10 @@ pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<
     let at_start = mechanism.inverse(&start).map_err(PlanErrorKind::Unreachable);
     if let Err(kind) = at_start.and_then(|joints| travel(machine, &start, &joints)) {
         let error = PlanError { kind, span: Span::default(), pose: start };
-        checked.add(program, messages::plan(program, machine, &error));
+        let mut finding = messages::plan(program, machine, &error);
+        finding.message = format!("where the machine stands at the start: {}", finding.message);
+        finding.help = Some("choose a start within reach: --start, or home in the machine file".to_owned());
+        checked.add(program, finding);
     }
     let mut interpreter = interpreter(machine, options, &start);
     let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
