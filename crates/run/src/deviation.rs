@@ -2,54 +2,62 @@
 //! before any blend, for as long as the machine is near them.
 
 use pkm_kins::maths::sqrt;
-use pkm_planner::path::{Geometry, Vector};
+use pkm_planner::path::{Geometry, Line, Vector};
 use std::collections::VecDeque;
 
 /// The programmed moves around the machine.
 #[derive(Debug, Default)]
 pub(crate) struct Programmed {
     moves: VecDeque<(u32, Geometry)>,
+    /// Ends of the chords that a joined move stands for (G64 Q), with the number of that move.
+    chords: VecDeque<(u32, Vector)>,
 }
 
 impl Programmed {
-    /// A move of the planner, or one of the chords it stands for.
-    pub(crate) fn push(&mut self, motion: u32, geometry: Geometry) {
+    /// A move of the planner, with the ends of the chords it stands for, if it is a joined one.
+    pub(crate) fn push(&mut self, motion: u32, geometry: Geometry, chords: &[Vector]) {
         self.moves.push_back((motion, geometry));
+        if chords.len() > 1 {
+            self.chords.extend(chords.iter().map(|end| (motion, *end)));
+        }
     }
 
     /// The machine goes on elsewhere: nothing programmed so far is near.
     pub(crate) fn clear(&mut self) {
         self.moves.clear();
+        self.chords.clear();
     }
 
     /// Distance (mm; the larger of XYZ and UVW) of a pose from the path, while the planner is on move `motion`,
     /// at `s` of it, or on the blend after it.
     pub(crate) fn distance_mm(&mut self, motion: u32, s: f64, blending: bool, pose: &Vector) -> Option<f64> {
-        while self.moves.front().is_some_and(|(number, _)| *number < motion)
-            && self.moves.get(1).is_some_and(|(number, _)| *number <= motion)
-        {
+        while self.moves.get(1).is_some_and(|(number, _)| *number <= motion) {
             self.moves.pop_front();
         }
-        let &(here, _) = self.moves.front().filter(|(number, _)| *number <= motion)?;
-        let next = self.moves.iter().map(|(number, _)| *number).find(|number| *number != here);
-        let mut best = f64::INFINITY;
-        for (k, (number, geometry)) in self.moves.iter().enumerate() {
-            let alone = |k: usize| self.moves.get(k).is_none_or(|(other, _)| other != number);
-            let guess = match *number {
-                // One of several chords: a line is found from anywhere.
-                n if (n == here || blending && Some(n) == next)
-                    && !(alone(k + 1) && alone(k.wrapping_sub(1))) =>
-                {
-                    0.5 * geometry.length()
-                }
-                n if n == here && blending => geometry.length(),
-                n if n == here => s,
-                n if blending && Some(n) == next => 0.0,
-                _ => break,
-            };
-            best = best.min(distance_mm(geometry, guess, pose));
+        let &(here, ref geometry) = self.moves.front().filter(|(number, _)| *number <= motion)?;
+        while self.chords.front().is_some_and(|(number, _)| *number < here) {
+            self.chords.pop_front();
+        }
+        let mut best = self.from_move(here, geometry, if blending { geometry.length() } else { s }, pose);
+        if blending && let Some((next, geometry)) = self.moves.get(1) {
+            best = best.min(self.from_move(*next, geometry, 0.0, pose));
         }
         Some(best)
+    }
+
+    /// Distance from a move as it was programmed: from its chords, if it has any.
+    fn from_move(&self, motion: u32, geometry: &Geometry, guess: f64, pose: &Vector) -> f64 {
+        let mut best = f64::INFINITY;
+        let mut start = geometry.at(0.0).position;
+        let after = self.chords.iter().skip_while(|(number, _)| *number < motion);
+        for (_, end) in after.take_while(|(number, _)| *number == motion) {
+            if let Some(line) = Line::new(start, *end) {
+                // A line is found from anywhere.
+                best = best.min(distance_mm(&Geometry::Line(line), 0.0, pose));
+            }
+            start = *end;
+        }
+        if best.is_finite() { best } else { distance_mm(geometry, guess, pose) }
     }
 }
 

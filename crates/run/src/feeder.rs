@@ -13,7 +13,7 @@ use pkm_hal_sim::{Setpoint, SetpointSource};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Joints, Kinematics, Pose, maths};
 use pkm_machine::{Machine, Switched};
-use pkm_planner::path::{Geometry, Line, Tolerance, Vector, feed_length};
+use pkm_planner::path::{Tolerance, Vector, feed_length};
 use pkm_planner::{
     AxisLimits, Chords, Event, Frame, JointLimits, Limits, Merger, Move, Planner, PushError, Smoother, State,
 };
@@ -378,21 +378,11 @@ impl<'a> Feeder<'a> {
     }
 
     fn push(&mut self, step: Move, chords: &Chords) -> Result<(), Diagnostic> {
-        let mut start = step.geometry.at(0.0);
         let motion = self.planner.push(step).map_err(|error| self.refused(&error))?;
         let length = step.geometry.length();
-        self.path_length_mm += length * feed_length(&start.first, step.feed.group);
-        if chords.len() <= 1 {
-            if length > 0.0 {
-                self.programmed.push(motion, step.geometry);
-            }
-            return Ok(());
-        }
-        for end in chords {
-            if let Some(line) = Line::new(start.position, *end) {
-                self.programmed.push(motion, Geometry::Line(line));
-            }
-            start.position = *end;
+        self.path_length_mm += length * feed_length(&step.geometry.at(0.0).first, step.feed.group);
+        if length > 0.0 {
+            self.programmed.push(motion, step.geometry, chords);
         }
         Ok(())
     }
