@@ -38,15 +38,15 @@ impl Programmed {
         while self.chords.front().is_some_and(|(number, _)| *number < here) {
             self.chords.pop_front();
         }
-        let mut best = self.from_move(here, geometry, if blending { geometry.length() } else { s }, pose);
+        let mut best = self.off_move(here, geometry, if blending { geometry.length() } else { s }, pose);
         if blending && let Some((next, geometry)) = self.moves.get(1) {
-            best = best.min(self.from_move(*next, geometry, 0.0, pose));
+            best = best.min(self.off_move(*next, geometry, 0.0, pose));
         }
         Some(best)
     }
 
     /// Distance from a move as it was programmed: from its chords, if it has any.
-    fn from_move(&self, motion: u32, geometry: &Geometry, guess: f64, pose: &Vector) -> f64 {
+    fn off_move(&self, motion: u32, geometry: &Geometry, guess: f64, pose: &Vector) -> f64 {
         let mut best = f64::INFINITY;
         let mut start = geometry.at(0.0).position;
         let after = self.chords.iter().skip_while(|(number, _)| *number < motion);
