@@ -82,6 +82,11 @@ impl JointRange {
     /// Slack for rounding, from the specification (mm, rad).
     pub const TOLERANCE: f64 = 1e-9;
 
+    /// True within the range or past its ends by rounding only; false for NaN.
+    pub fn contains(&self, value: f64) -> bool {
+        value >= self.min - Self::TOLERANCE && value <= self.max + Self::TOLERANCE
+    }
+
     /// Checks the joints against their travel and names the first one outside.
     pub fn check(ranges: &[JointRange], joints: &Joints) -> Result<(), JointLimit> {
         for ((range, &value), joint) in ranges.iter().zip(joints).zip(0..MAX_JOINTS) {

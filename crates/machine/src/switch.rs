@@ -7,8 +7,7 @@ use crate::refusal::Refusal;
 use crate::source::Findings;
 use pkm_canon::{MACHINE_CODES, MOST_MACHINE_CODES};
 use pkm_kins::{
-    FormSwitchError, InverseError, JointLimit, JointRange, Joints, Kinematics, Mechanism, OxForm, Pose,
-    Spindle, maths,
+    FormSwitchError, InverseError, JointLimit, Joints, Kinematics, Mechanism, OxForm, Pose, Spindle, maths,
 };
 use std::fmt;
 
@@ -123,8 +122,7 @@ impl Machine {
         for limits in &self.axes {
             let Some(range) = limits.range else { continue };
             let value = pose.get(limits.axis);
-            let within =
-                value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE;
+            let within = range.contains(value);
             if !within {
                 let letter = limits.axis.letter();
                 let (unit, face): (_, fn(f64) -> f64) =

@@ -111,16 +111,14 @@ impl<const R: usize> Limits<R> {
     /// Checks a pose and its joints against travel.
     pub(crate) fn check_travel(&self, pose: &Pose, joints: &Joints) -> Result<(), PlanErrorKind> {
         for (joint, (limits, &value)) in self.joints.iter().zip(joints).enumerate() {
-            if !(value >= limits.range.min - JointRange::TOLERANCE
-                && value <= limits.range.max + JointRange::TOLERANCE)
-            {
+            if !limits.range.contains(value) {
                 return Err(PlanErrorKind::JointTravel { joint, value, range: limits.range });
             }
         }
         for limits in &self.axes {
             let value = pose.get(limits.axis);
             if let Some(range) = limits.range
-                && !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE)
+                && !range.contains(value)
             {
                 return Err(PlanErrorKind::AxisTravel { axis: limits.axis, value, range });
             }
@@ -227,8 +225,7 @@ impl<const R: usize> Limits<R> {
             {
                 let to_turn = length * speed_a.abs() / (speed_a.abs() + speed_b.abs());
                 let value = at(&a.position) + 0.5 * speed_a * v_max * GUARD * to_turn;
-                if !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE)
-                {
+                if !range.contains(value) {
                     let kind = match self.axes.get(row.wrapping_sub(self.joints.len())) {
                         Some(limits) => PlanErrorKind::AxisTravel { axis: limits.axis, value, range },
                         None => PlanErrorKind::JointTravel { joint: row, value, range },

@@ -146,14 +146,14 @@ fn check_switch(
 fn travel(machine: &Machine, pose: &Pose, joints: &Joints) -> Result<(), PlanErrorKind> {
     for (joint, (limits, &value)) in machine.joints.iter().zip(joints).enumerate() {
         let range = limits.range;
-        if !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE) {
+        if !range.contains(value) {
             return Err(PlanErrorKind::JointTravel { joint, value, range });
         }
     }
     for limits in &machine.axes {
         let value = pose.get(limits.axis);
         if let Some(range) = limits.range
-            && !(value >= range.min - JointRange::TOLERANCE && value <= range.max + JointRange::TOLERANCE)
+            && !range.contains(value)
         {
             return Err(PlanErrorKind::AxisTravel { axis: limits.axis, value, range });
         }

@@ -28,6 +28,7 @@
 #![no_std]
 
 pub mod conditioner;
+pub mod drivers;
 pub mod edges;
 pub mod generator;
 pub mod runs;

@@ -47,19 +47,9 @@ pub struct DriverChannel {
     pub start: i64,
 }
 
-/// The minima of known drivers at their inputs, from the makers' data sheets (Allegro A4988, TI DRV8825 SLVSA73, Trinamic
-/// TMC2209, Leadshine DM542; boxes named TB6600 differ by maker, these are the slowest usual figures).
-pub const MODELS: [(&str, PulseTimingNs); 5] = [
-    ("A4988", PulseTimingNs { step_length: 1000, step_space: 1000, dir_setup: 200, dir_hold: 200 }),
-    ("DRV8825", PulseTimingNs { step_length: 1900, step_space: 1900, dir_setup: 650, dir_hold: 650 }),
-    ("TMC2209", PulseTimingNs { step_length: 104, step_space: 104, dir_setup: 20, dir_hold: 20 }),
-    ("DM542", PulseTimingNs { step_length: 2500, step_space: 2500, dir_setup: 5000, dir_hold: 5000 }),
-    ("TB6600", PulseTimingNs { step_length: 5000, step_space: 5000, dir_setup: 20_000, dir_hold: 20_000 }),
-];
-
 /// The minima of a driver by its model, in any case.
 pub fn minimum(model: &str) -> Option<PulseTimingNs> {
-    MODELS.into_iter().find(|(name, _)| name.eq_ignore_ascii_case(model)).map(|(_, minimum)| minimum)
+    pkm_stepgen::drivers::find(model).map(|(_, minimum)| minimum)
 }
 
 /// State of one driver.
