@@ -20,11 +20,14 @@
 pub mod block;
 pub mod component;
 pub mod components;
+mod config;
 pub mod faults;
 pub mod hal;
 mod hal_error;
 pub mod hal_file;
 pub mod modules;
+mod pins;
+mod report;
 pub mod simulation;
 pub mod stream;
 pub mod trace;
@@ -33,14 +36,13 @@ pub mod vcd;
 
 pub use component::{Component, Fault, PinIndex, PinName, Setpoint, SetpointSource, Tick};
 pub use components::driver::Violations;
+pub use config::{ConfigError, JointConfig, SimulationConfig};
 pub use faults::{FaultKind, FaultTextError, PinFault};
 pub use hal::{Hal, MAX_NAME, Role};
 pub use hal_error::HalError;
 pub use pkm_stepgen::{Edge, Line, PulseTimingNs};
-pub use simulation::{
-    ConfigError, JointConfig, JointState, JointStatistics, Observer, Simulation, SimulationConfig, TickError,
-    TickReport,
-};
+pub use report::{JointState, JointStatistics, Observer, TickReport};
+pub use simulation::{Simulation, TickError};
 pub use stream::{StreamSteps, StreamWriter};
 pub use trace::TraceWriter;
 pub use values::{BitPin, FloatPin, PinType, S32Pin, U32Pin, Value, Values};

@@ -4,86 +4,20 @@
 //! simulation counts them itself, apart from generator and driver.
 
 use crate::component::{Fault, Setpoint, SetpointSource};
-use crate::components::driver::{Driver, DriverChannel, Drivers, Violations};
+use crate::components::driver::{Driver, DriverChannel, Drivers};
 use crate::components::motion::{Motion, MotionJoint};
 use crate::components::motor::{MotorChannel, Motors};
 use crate::components::stepgen::{Stepgen, StepgenChannel, StepgenError};
+use crate::config::{ConfigError, JointConfig, SimulationConfig, THREAD, shown_scale, wire};
 use crate::hal::Hal;
 use crate::hal_error::HalError;
+use crate::report::{JointState, JointStatistics, Observer, TickReport};
 use crate::values::{BitPin, FloatPin};
-use pkm_kins::maths::{PI, radians};
-use pkm_kins::{AxisSet, ForwardError, JointKind, JointRange, Joints, Kinematics, MAX_JOINTS, Pose};
-use pkm_stepgen::{Edge, EdgeError, Line, Period, PulseTiming, PulseTimingNs, StepGenerator, StepType};
+use pkm_kins::maths::radians;
+use pkm_kins::{AxisSet, ForwardError, JointKind, Joints, Kinematics, MAX_JOINTS, Pose};
+use pkm_stepgen::{Edge, Line, Period, PulseTiming, StepGenerator, StepType};
 use std::any::Any;
 use std::fmt;
-
-/// One joint of the machine.
-#[derive(Debug, Clone, PartialEq)]
-pub struct JointConfig {
-    /// For people.
-    pub name: String,
-    /// Length or angle.
-    pub kind: JointKind,
-    /// Steps per mm or rad, not 0; negative turns the motor the other way round.
-    pub steps_per_unit: f64,
-    /// Times of the pulses as configured.
-    pub timing: PulseTimingNs,
-    /// The driver's minima by its data sheet: step high, step low, direction setup and hold.
-    pub driver_minimum: PulseTimingNs,
-    /// Travel, mm or rad.
-    pub range: JointRange,
-    /// Where it stands at the start, mm or rad.
-    pub start: f64,
-}
-
-/// The machine.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SimulationConfig {
-    /// In joint order, 1 to [`MAX_JOINTS`].
-    pub joints: Vec<JointConfig>,
-    /// The coordinates it has.
-    pub axes: AxisSet,
-    /// Its pose at the start, mm and rad.
-    pub start: Pose,
-    /// ns, a multiple of the timer's period.
-    pub servo_period_ns: u64,
-    /// Unit of all edge times, ns.
-    pub timer_period_ns: u64,
-}
-
-/// Why a machine cannot be wired.
-#[derive(Debug, Clone, PartialEq)]
-pub enum ConfigError {
-    /// No joint, or more than [`MAX_JOINTS`].
-    JointCount(usize),
-    /// A joint's scale or start is not finite, the scale is 0, or the start is beyond 2³² steps.
-    Joint {
-        /// Counted from 0.
-        joint: usize,
-        /// Why.
-        error: EdgeError,
-    },
-    /// Periods, pulse times.
-    Hal(HalError),
-}
-
-impl From<HalError> for ConfigError {
-    fn from(error: HalError) -> Self {
-        Self::Hal(error)
-    }
-}
-
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::JointCount(count) => write!(f, "{count} joints; a machine has 1 to {MAX_JOINTS}"),
-            Self::Joint { joint, error } => write!(f, "joint {joint}, scale or start: {error}"),
-            Self::Hal(error) => error.fmt(f),
-        }
-    }
-}
-
-impl std::error::Error for ConfigError {}
 
 /// Why a period did not go as wanted. After a fault the machine is stopped as by [`Simulation::emergency_stop`].
 #[derive(Debug, Clone, PartialEq)]
@@ -105,71 +39,6 @@ impl<E: fmt::Display> fmt::Display for TickError<E> {
 
 impl<E: fmt::Debug + fmt::Display> std::error::Error for TickError<E> {}
 
-/// A joint at the end of a period.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct JointState {
-    /// Commanded, mm or rad.
-    pub commanded: f64,
-    /// Counted from the edges, mm or rad.
-    pub position: f64,
-    /// Counted from the edges, steps; 0 is the joint's zero.
-    pub count: i64,
-    /// `count` less the commanded position, steps.
-    pub step_error: f64,
-}
-
-/// The machine at the end of a period.
-#[derive(Debug, Clone, Copy)]
-pub struct TickReport<'a> {
-    /// Number of the period; 0 is the start.
-    pub tick: u64,
-    /// tick × servo period.
-    pub time_ns: u64,
-    /// What was commanded for this time.
-    pub setpoint: &'a Setpoint,
-    /// In joint order.
-    pub joints: &'a [JointState],
-}
-
-/// Sees everything that the machine does: for each period first its edges in order of time, then the report.
-pub trait Observer {
-    /// False: edges are not wanted. They come all the same if another observer wants them.
-    fn wants_edges(&self) -> bool {
-        true
-    }
-
-    /// An edge on one of the lines to the drivers.
-    fn edge(&mut self, edge: &Edge);
-
-    /// The end of a period.
-    fn tick(&mut self, report: &TickReport<'_>);
-}
-
-/// What a joint did so far.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct JointStatistics {
-    /// Steps in either direction.
-    pub steps: u64,
-    /// Changes of the direction line.
-    pub reversals: u64,
-    /// Shortest time between two steps, ns; None before the second step.
-    pub min_pulse_interval_ns: Option<u64>,
-    /// Largest |count − commanded| at the ends of periods, steps.
-    pub max_step_error: f64,
-    /// Largest |count − commanded| just before and after each step, steps.
-    pub max_edge_error: f64,
-    /// Steps that came later than wanted, for the driver's timing.
-    pub delayed_steps: u64,
-    /// The largest such delay, ns.
-    pub max_delay_ns: u64,
-    /// Times shorter than the driver's data sheet allows.
-    pub violations: Violations,
-    /// Lowest position counted from the edges at the ends of periods, mm or rad.
-    pub min_position: f64,
-    /// Highest such position, mm or rad.
-    pub max_position: f64,
-}
-
 /// Where the joint's lines stand as the simulation has seen them.
 #[derive(Debug, Clone)]
 struct Lines {
@@ -186,7 +55,6 @@ struct Lines {
 /// Places of the components in the HAL, in order of loading.
 const STEPGEN: usize = 1;
 const DRIVER: usize = 2;
-const THREAD: &str = "servo-thread";
 
 /// The simulated machine. `Clone` forks it.
 #[derive(Clone)]
@@ -545,14 +413,6 @@ impl Simulation {
     }
 }
 
-/// Steps per mm, or per degree (HAL pins of rotary joints are in degrees).
-fn shown_scale(kind: JointKind, steps_per_unit: f64) -> f64 {
-    match kind {
-        JointKind::Linear => steps_per_unit,
-        JointKind::Rotary => steps_per_unit * (PI / 180.0),
-    }
-}
-
 /// The component that `Simulation::new` loaded at this place.
 fn part<T: Any>(hal: &Hal, place: usize) -> &T {
     let component: Option<&dyn Any> = hal.component(place).map(|component| component as &dyn Any);
@@ -561,35 +421,6 @@ fn part<T: Any>(hal: &Hal, place: usize) -> &T {
 
 fn edge(joint: usize, line: Line, edge: &crate::values::LineEdge) -> Edge {
     Edge { time: edge.time, joint: joint as u8, line, level: edge.level }
-}
-
-fn wire(hal: &mut Hal, joints: usize) -> Result<(), HalError> {
-    for n in 0..joints {
-        for (signal, writer, reader) in [
-            ("pos-cmd", "joint.N.motor-pos-cmd", "stepgen.N.position-cmd"),
-            ("vel-cmd", "joint.N.vel-cmd", "stepgen.N.velocity-cmd"),
-            ("step", "stepgen.N.step", "driver.N.step"),
-            ("dir", "stepgen.N.dir", "driver.N.dir"),
-            ("enable", "joint.N.amp-enable-out", "stepgen.N.enable"),
-            ("enable", "joint.N.amp-enable-out", "driver.N.enable"),
-            ("counts", "driver.N.counts", "motor.N.counts"),
-            ("motor-pos", "motor.N.position", "joint.N.motor-pos-fb"),
-        ] {
-            let numbered = |pin: &str| pin.replace('N', &n.to_string());
-            hal.net(&format!("j{n}-{signal}"), &[&numbered(writer), &numbered(reader)])?;
-        }
-    }
-    for function in [
-        "motion-command-handler",
-        "motion-controller",
-        "stepgen.update-freq",
-        "driver.update",
-        "motor.update",
-        "stepgen.capture-position",
-    ] {
-        hal.addf(function, THREAD)?;
-    }
-    Ok(())
 }
 
 fn lines(hal: &Hal, config: &SimulationConfig) -> Result<Vec<Lines>, HalError> {

@@ -18,7 +18,8 @@
 //! other, so a player that holds two windows never waits. Steps stay in their servo period and are at most the tolerance
 //! off, so positions at the ends of periods are those of the other files.
 
-use crate::simulation::{Observer, Simulation, TickReport};
+use crate::report::{Observer, TickReport};
+use crate::simulation::Simulation;
 use crate::trace::Output;
 use pkm_stepgen::runs::MAX_RUN_BYTES;
 use pkm_stepgen::{Edge, Line, Run, RunLimits};

@@ -3,15 +3,12 @@
 //! Columns: `tick,time_s,line`, then `axis.x.pos-cmd_mm` for each coordinate of the machine (`_deg` for A, B, C), then for
 //! each joint `joint.0.pos-cmd_mm` and `joint.0.pos-fb_mm` (counted from the edges; `_deg` for rotary joints). Numbers are
 //! the shortest that read back to the same `f64`; lines end with LF.
-//!
-//! With substeps there are rows between the ends of periods too; `tick` is there the last period that has ended. Joint
-//! commands between are those of the step generator (a cubic through both ends), the pose is theirs by the forward
-//! kinematics.
 
 use crate::component::Setpoint;
-use crate::simulation::{JointState, Observer, Simulation, TickReport};
-use pkm_kins::{Axis, JointKind, Joints, Kinematics, MAX_JOINTS, Pose, maths};
-use pkm_stepgen::{Edge, Line};
+use crate::report::{JointState, Observer, TickReport};
+use crate::simulation::Simulation;
+use pkm_kins::{Axis, JointKind, maths};
+use pkm_stepgen::Edge;
 use std::io::{self, Write};
 
 /// Bytes collected before they are written.
@@ -68,55 +65,6 @@ pub struct TraceWriter<W: Write> {
     out: Output<W>,
     axes: Vec<Axis>,
     rotary: Vec<bool>,
-    between: Option<Between>,
-}
-
-/// What the rows between the ends of periods need.
-struct Between {
-    substeps: u32,
-    kinematics: Box<dyn Kinematics + Send>,
-    steps_per_unit: Vec<f64>,
-    servo_period_ns: u64,
-    timer_period_ns: u64,
-    /// The end of the last period.
-    tick: u64,
-    setpoint: Setpoint,
-    states: Vec<JointState>,
-    positive: Vec<bool>,
-    edges: Vec<Edge>,
-}
-
-impl std::fmt::Debug for Between {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Between").field("substeps", &self.substeps).finish_non_exhaustive()
-    }
-}
-
-impl Between {
-    /// Commanded joints at `u` of the period that ends with `end`, mm or rad.
-    fn commanded(&self, end: &Setpoint, u: f64) -> Joints {
-        let (seconds, w) = (self.servo_period_ns as f64 / 1e9, 1.0 - u);
-        let mut joints = [0.0; MAX_JOINTS];
-        for (n, joint) in joints.iter_mut().enumerate() {
-            // cubic Hermite, basis functions
-            *joint = self.setpoint.joints[n] * (w * w * (1.0 + 2.0 * u))
-                + end.joints[n] * (u * u * (3.0 - 2.0 * u))
-                + seconds * (self.setpoint.velocities[n] * (w * w * u) - end.velocities[n] * (u * u * w));
-        }
-        joints
-    }
-
-    /// The pose of these joints; where the mechanism has none (rounding, at its edge), between the poses at the ends.
-    fn pose(&self, joints: &Joints, end: &Setpoint, u: f64) -> Pose {
-        let start = &self.setpoint.pose;
-        self.kinematics.forward(joints, start).unwrap_or_else(|_| {
-            let mut pose = *start;
-            for axis in Axis::ALL {
-                pose.set(axis, start.get(axis) + u * (end.pose.get(axis) - start.get(axis)));
-            }
-            pose
-        })
-    }
 }
 
 impl<W: Write> TraceWriter<W> {
@@ -140,73 +88,10 @@ impl<W: Write> TraceWriter<W> {
             column(format!("joint.{n}.pos-fb_{unit}"));
         }
         out.text.push(b'\n');
-        let mut trace = Self { out, axes, rotary, between: None };
+        let mut trace = Self { out, axes, rotary };
         let report = simulation.report();
         trace.row(report.tick, report.time_ns as f64 / 1e9, report.setpoint, report.joints);
         trace
-    }
-
-    /// Writes `substeps` rows a period, the last at its end. To be called before the first period.
-    #[must_use]
-    pub fn with_substeps(
-        mut self,
-        simulation: &Simulation,
-        substeps: u32,
-        kinematics: Box<dyn Kinematics + Send>,
-    ) -> Self {
-        let report = simulation.report();
-        self.between = (substeps > 1).then(|| Between {
-            substeps,
-            kinematics,
-            steps_per_unit: simulation.steps_per_unit().collect(),
-            servo_period_ns: simulation.servo_period_ns(),
-            timer_period_ns: simulation.hal().timer_period_ns(),
-            tick: report.tick,
-            setpoint: *report.setpoint,
-            states: report.joints.to_vec(),
-            positive: vec![false; report.joints.len()],
-            edges: Vec::new(),
-        });
-        self
-    }
-
-    /// The rows inside the period that has just ended.
-    fn rows_between(&mut self, report: &TickReport<'_>) {
-        let Some(mut between) = self.between.take() else { return };
-        let start_ns = between.tick * between.servo_period_ns;
-        let edges = std::mem::take(&mut between.edges);
-        let mut edges_left = edges.iter().peekable();
-        for i in 1..=between.substeps {
-            let u = f64::from(i) / f64::from(between.substeps);
-            let time_ns = start_ns as f64 + between.servo_period_ns as f64 * u;
-            while let Some(edge) =
-                edges_left.next_if(|edge| (edge.time * between.timer_period_ns) as f64 <= time_ns)
-            {
-                let n = usize::from(edge.joint);
-                match edge.line {
-                    Line::Dir => between.positive[n] = edge.level,
-                    Line::Step if edge.level => {
-                        between.states[n].count += if between.positive[n] { 1 } else { -1 };
-                    }
-                    _ => {}
-                }
-            }
-            if i == between.substeps {
-                break; // the row of the end itself comes from the report
-            }
-            let joints = between.commanded(report.setpoint, u);
-            let setpoint = Setpoint { pose: between.pose(&joints, report.setpoint, u), ..*report.setpoint };
-            for (n, state) in between.states.iter_mut().enumerate() {
-                state.commanded = joints[n];
-                state.position = state.count as f64 / between.steps_per_unit[n];
-            }
-            self.row(between.tick, time_ns / 1e9, &setpoint, &between.states);
-        }
-        between.edges = edges;
-        between.edges.clear();
-        between.tick = report.tick;
-        between.setpoint = *report.setpoint;
-        self.between = Some(between);
     }
 
     fn row(&mut self, tick: u64, time_s: f64, setpoint: &Setpoint, joints: &[JointState]) {
@@ -253,17 +138,12 @@ fn number(text: &mut Vec<u8>, value: f64) {
 
 impl<W: Write> Observer for TraceWriter<W> {
     fn wants_edges(&self) -> bool {
-        self.between.is_some()
+        false
     }
 
-    fn edge(&mut self, edge: &Edge) {
-        if let Some(between) = &mut self.between {
-            between.edges.push(*edge);
-        }
-    }
+    fn edge(&mut self, _edge: &Edge) {}
 
     fn tick(&mut self, report: &TickReport<'_>) {
-        self.rows_between(report);
         self.row(report.tick, report.time_ns as f64 / 1e9, report.setpoint, report.joints);
     }
 }

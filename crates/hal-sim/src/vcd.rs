@@ -3,7 +3,8 @@
 //! Leaf names are unique (`joint0_step`, `joint0_dir`), because some readers drop the scope. The timescale is the timer's
 //! period where VCD can say it (1, 10 or 100 ns, µs, ms), else 1 ns.
 
-use crate::simulation::{Observer, Simulation, TickReport};
+use crate::report::{Observer, TickReport};
+use crate::simulation::Simulation;
 use crate::trace::Output;
 use pkm_kins::MAX_JOINTS;
 use pkm_stepgen::{Edge, Line};

@@ -2,10 +2,8 @@
 
 mod common;
 
-use common::{SERVO_NS, machine, wave};
+use common::{SERVO_NS, machine};
 use pkm_hal_sim::{StreamSteps, StreamWriter, TraceWriter, VcdSteps, VcdWriter};
-use pkm_kins::cartesian::Cartesian;
-use pkm_kins::{Axis, AxisSet};
 use std::io::{self, Write};
 
 /// A disk with room for so many bytes.
@@ -61,33 +59,6 @@ fn a_damaged_vcd_is_refused() {
     // cut off inside an edge
     let cut = good.rfind("\n1").unwrap() + 2;
     assert!(count(&good[..cut]).is_err());
-}
-
-#[test]
-fn substeps_show_the_path_between_the_ticks() {
-    let (mut simulation, mut source) = machine(2);
-    let xy = Cartesian::new(AxisSet::new(&[Axis::X, Axis::Y])).unwrap();
-    let mut trace = TraceWriter::new(Vec::new(), &simulation).with_substeps(&simulation, 10, Box::new(xy));
-    for _ in 0..1500 {
-        simulation.tick(&mut source, &mut [&mut trace]).unwrap();
-    }
-    let text = String::from_utf8(trace.finish().unwrap()).unwrap();
-    let mut rows = 0;
-    for (i, line) in text.lines().skip(1).enumerate() {
-        let fields: Vec<f64> = line.split(',').map(|field| field.parse().unwrap()).collect();
-        assert_eq!(fields[0], (i / 10) as f64, "{line}");
-        assert!((fields[1] - i as f64 * 1e-4).abs() < 1e-12, "{line}");
-        for n in 0..2 {
-            let (command, position) = (fields[6 + 2 * n], fields[7 + 2 * n]);
-            assert!((command - wave(n, i as f64 * 1e-4).0).abs() < 1e-7, "row {i} {line}");
-            assert!((position - command).abs() * 400.0 < 0.52, "row {i} {line}");
-        }
-        if i % 10 != 0 {
-            assert_eq!((fields[3], fields[4]), (fields[6], fields[8]), "{line}");
-        }
-        rows = i + 1;
-    }
-    assert_eq!(rows, 15_001);
 }
 
 #[test]

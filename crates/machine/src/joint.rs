@@ -1,12 +1,13 @@
 //! `[[joint]]` and its driver, from as written to what can run.
 
 use crate::checks::{identifier, integer, positive, range};
-use crate::drivers::{self, DriverTiming, StepTiming};
+use crate::drivers::DriverTiming;
 use crate::file::{self, Nanoseconds, Number};
 use crate::machine::Joint;
 use crate::source::Findings;
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{JointKind, Kinematics, maths};
+use pkm_stepgen::{PulseTimingNs, drivers};
 use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
 
@@ -106,7 +107,7 @@ fn build_joint(
     if let (Some(per_second), Some(per_unit), Some(timing), Some((key, number))) =
         (max_velocity, steps_per_unit, &timing, &velocity)
     {
-        let shortest_ns = timing.on_grid(timer_period_ns).shortest_pulse_interval_ns();
+        let shortest_ns = timing.on_grid(timer_period_ns).step_interval();
         let fastest = 1e9 / shortest_ns as f64;
         if per_second * per_unit > fastest {
             let message = format!(
@@ -145,7 +146,7 @@ fn build_driver(
     joint_span: &Range<usize>,
     timer_period_ns: u64,
     findings: &mut Findings<'_>,
-) -> Option<(DriverTiming, StepTiming)> {
+) -> Option<(DriverTiming, PulseTimingNs)> {
     let known = || drivers::DRIVERS.map(|(name, _)| name).join(", ");
     let Some(driver) = driver else {
         let help = format!("add [driver] with `model` ({}) or `minimum`", known());
@@ -173,11 +174,11 @@ fn build_driver(
             let step_space_ns = time("step_space_ns", &written.step_space_ns);
             let direction_setup_ns = time("direction_setup_ns", &written.direction_setup_ns);
             let direction_hold_ns = time("direction_hold_ns", &written.direction_hold_ns);
-            let minimum = StepTiming {
-                step_length_ns: step_length_ns?,
-                step_space_ns: step_space_ns?,
-                direction_setup_ns: direction_setup_ns?,
-                direction_hold_ns: direction_hold_ns?,
+            let minimum = PulseTimingNs {
+                step_length: step_length_ns?,
+                step_space: step_space_ns?,
+                dir_setup: direction_setup_ns?,
+                dir_hold: direction_hold_ns?,
             };
             ("custom", minimum)
         }
@@ -211,26 +212,17 @@ fn build_driver(
         Some(time_ns)
     };
     let step_length_ns =
-        time("step_length_ns", &driver.step_length_ns, minimum.step_length_ns, usual.step_length_ns);
-    let step_space_ns =
-        time("step_space_ns", &driver.step_space_ns, minimum.step_space_ns, usual.step_space_ns);
-    let direction_setup_ns = time(
-        "direction_setup_ns",
-        &driver.direction_setup_ns,
-        minimum.direction_setup_ns,
-        usual.direction_setup_ns,
-    );
-    let direction_hold_ns = time(
-        "direction_hold_ns",
-        &driver.direction_hold_ns,
-        minimum.direction_hold_ns,
-        usual.direction_hold_ns,
-    );
-    let timing = StepTiming {
-        step_length_ns: step_length_ns?,
-        step_space_ns: step_space_ns?,
-        direction_setup_ns: direction_setup_ns?,
-        direction_hold_ns: direction_hold_ns?,
+        time("step_length_ns", &driver.step_length_ns, minimum.step_length, usual.step_length);
+    let step_space_ns = time("step_space_ns", &driver.step_space_ns, minimum.step_space, usual.step_space);
+    let direction_setup_ns =
+        time("direction_setup_ns", &driver.direction_setup_ns, minimum.dir_setup, usual.dir_setup);
+    let direction_hold_ns =
+        time("direction_hold_ns", &driver.direction_hold_ns, minimum.dir_hold, usual.dir_hold);
+    let timing = PulseTimingNs {
+        step_length: step_length_ns?,
+        step_space: step_space_ns?,
+        dir_setup: direction_setup_ns?,
+        dir_hold: direction_hold_ns?,
     };
     Some((DriverTiming { model: model.to_owned(), minimum }, timing))
 }

@@ -24,7 +24,7 @@ pub mod shipped;
 pub mod source;
 mod switch;
 
-pub use drivers::{DriverTiming, StepTiming};
+pub use drivers::DriverTiming;
 pub use file::MachineFile;
 pub use load::read;
 pub use machine::{AxisLimits, Joint, Machine, PathSettings, SingularityGuard};

@@ -1,7 +1,7 @@
 //! A machine that can run: every number finite and in range, every joint matched to the mechanism, home inside the travel.
 
 use crate::checks::{finite, identifier, integer, not_negative, positive, range};
-use crate::drivers::{DriverTiming, StepTiming};
+use crate::drivers::DriverTiming;
 use crate::file::{self, MachineFile, Number};
 use crate::joint::joints;
 use crate::source::Findings;
@@ -9,6 +9,7 @@ use crate::switch::{Switch, switches};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Axis, JointKind, JointRange, Kinematics, Pose, maths};
+use pkm_stepgen::PulseTimingNs;
 use std::ops::RangeInclusive;
 
 /// A validated machine. Units: mm, **radians**, seconds, and ns where the name says so.
@@ -58,7 +59,7 @@ pub struct Joint {
     /// Steps per mm or rad, above 0.
     pub steps_per_unit: f64,
     /// As configured; never shorter than the driver's minima.
-    pub timing: StepTiming,
+    pub timing: PulseTimingNs,
     /// The driver and its minima.
     pub driver: DriverTiming,
 }

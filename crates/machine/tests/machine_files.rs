@@ -100,7 +100,7 @@ fn overrides_reach_every_index_and_optional_keys() {
     assert_eq!(machine.joints[1].max_acceleration, 250.0);
     assert_eq!(machine.axis(Axis::X).unwrap().max_velocity, Some(20.0));
     assert_eq!(machine.joints[0].driver.model, "TMC2209");
-    assert_eq!(machine.joints[0].timing.step_length_ns, 200);
+    assert_eq!(machine.joints[0].timing.step_length, 200);
     assert_eq!(machine.servo_period_ns, 500_000);
 }
 

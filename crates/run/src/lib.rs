@@ -166,8 +166,8 @@ fn simulation_config(machine: &Machine, start: Pose, substeps: u64) -> Simulatio
         name: joint.name.clone(),
         kind: joint.kind,
         steps_per_unit: joint.steps_per_unit,
-        timing: joint.timing.pulses(),
-        driver_minimum: joint.driver.pulses(),
+        timing: joint.timing,
+        driver_minimum: joint.driver.minimum,
         range: joint.range,
         start,
     });

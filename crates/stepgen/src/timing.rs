@@ -47,6 +47,25 @@ pub enum TimingError {
 }
 
 impl PulseTimingNs {
+    /// The times rounded up to multiples of the step timer's period, which is above 0.
+    #[must_use]
+    pub const fn on_grid(self, timer_period_ns: u64) -> Self {
+        const fn up(time_ns: u64, period_ns: u64) -> u64 {
+            time_ns.div_ceil(period_ns) * period_ns
+        }
+        Self {
+            step_length: up(self.step_length, timer_period_ns),
+            step_space: up(self.step_space, timer_period_ns),
+            dir_setup: up(self.dir_setup, timer_period_ns),
+            dir_hold: up(self.dir_hold, timer_period_ns),
+        }
+    }
+
+    /// Shortest time from one pulse to the next, ns.
+    pub const fn step_interval(self) -> u64 {
+        self.step_length + self.step_space
+    }
+
     /// In ticks of a timer of `timer_period_ns`, rounded up; step length and space are one tick at least.
     ///
     /// # Errors
