@@ -1,6 +1,7 @@
 //! The driver of a joint. The table of data sheets is `pkm_stepgen::drivers`.
 
 use pkm_stepgen::PulseTimingNs;
+pub use pkm_stepgen::drivers::DRIVERS;
 
 /// A driver and the shortest times it accepts.
 #[derive(Debug, Clone, PartialEq, Eq)]
