@@ -29,7 +29,7 @@ pub(crate) struct Compensation {
     first: bool,
     /// The tool centre in the plane.
     tool: Point,
-    /// Where the waiting move begins.
+    /// Where the waiting move begins, if LinuxCNC knows it: not of an entry arc, nor after a stop.
     begin: Option<Point>,
     /// G40 was the last: no arc may follow.
     pub(crate) arc_refused: bool,
@@ -143,8 +143,15 @@ impl State {
     pub(crate) fn finish_compensation(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         if self.compensates().is_some() && !self.cutter.first {
             self.end_at(self.cutter.tool, block, out)?;
+            self.cutter.begin = None;
         }
         Ok(())
+    }
+
+    /// The waiting moves go out as they are.
+    fn let_go(&mut self, out: &mut Out<'_>) {
+        out.flush();
+        self.cutter.begin = None;
     }
 
     /// Moves the end of the waiting moves and lets them go.
@@ -170,6 +177,10 @@ impl State {
                     (end[axes.first], end[axes.second]) = (point[0], point[1]);
                 }
                 Move::Arc { sweep: programmed, end, centre, turns } => {
+                    let old = distance(*centre, [end[axes.first], end[axes.second]]);
+                    if (old - distance(*centre, point)).abs() > 0.01 {
+                        return Err(Error { kind: ErrorKind::CcConcave, span: block.span() });
+                    }
                     if let Some(begin) = self.cutter.begin {
                         let angle = sweep(begin, point, *centre, *turns);
                         if *programmed != 0.0 && angle.abs() > programmed.abs() + slack {
@@ -199,20 +210,23 @@ impl State {
         let to = [end[axes.first], end[axes.second]];
         let radius = self.cutter.radius;
         let outward = if side == Side::Left { QUARTER } else { -QUARTER };
-        let direction = [to[0] - from[0], to[1] - from[1]];
+        let mut direction = [to[0] - from[0], to[1] - from[1]];
         let mut offset_end = self.cutter.tool;
         if self.cutter.first {
             let length = distance(from, to);
             if length <= radius {
                 return Err(Error { kind: ErrorKind::CcEntry { length, radius }, span: block.span() });
             }
-            offset_end = beside(to, heading(from, to) + outward, radius);
+            let across = heading(from, to) + outward;
+            offset_end = beside(to, across, radius);
+            // Seen across, the entry move never turns round, however far the corner behind it draws it back.
+            direction = [maths::cos(across), maths::sin(across)];
             self.cutter.begin = Some(from);
             self.cutter.first = false;
         } else if from != to {
             let along = heading(from, to);
             offset_end = beside(to, along + outward, radius);
-            let corner = Corner { from, along, side, outward, turns: None, traverse, centre: None };
+            let corner = Corner { from, along, side, outward, traverse, end, arc: None };
             self.turn_corner(&corner, beside(from, along + outward, radius), block, out)?;
         }
         let mut point = end;
@@ -262,8 +276,16 @@ impl State {
             }
             offset_centre = beside(offset_end, to_centre, half / maths::cos(angle));
             programmed = sweep(from, offset_end, offset_centre, turns);
-            self.cutter.begin = Some(from);
             self.cutter.first = false;
+            if !matches!(self.cutter.orientation, 0 | 9) {
+                // A lathe tool: first the point that is offset goes to where the arc begins.
+                let mut start = end;
+                (start[axes.first], start[axes.second]) = (from[0], from[1]);
+                start[axes.normal] = self.position[axes.normal];
+                let waiting = Move::Straight { traverse: false, direction: [0.0; 2], end: start };
+                out.queue.push_move(waiting, out.span);
+                self.cutter.begin = Some(from);
+            }
         } else {
             let outward = if side == Side::Left { QUARTER } else { -QUARTER };
             let to_centre = heading(from, centre);
@@ -273,9 +295,9 @@ impl State {
                 along,
                 side,
                 outward,
-                turns: Some(turns),
                 traverse: false,
-                centre: Some((centre, if is_inside { arc_radius - radius } else { arc_radius + radius })),
+                end,
+                arc: Some(CornerArc { turns, centre, radius: arc_radius }),
             };
             let middle = beside(from, if is_inside { to_centre } else { to_centre + maths::PI }, radius);
             self.turn_corner(&corner, middle, block, out)?;
@@ -298,104 +320,131 @@ impl State {
         out: &mut Out<'_>,
     ) -> Result<(), Error> {
         let axes = PlaneAxes::of(self.modal.plane);
-        let Corner { from, along, side, outward, .. } = *corner;
+        let Corner { from, along, side, outward, arc, .. } = *corner;
         let tool = self.cutter.tool;
         // Direction of travel before the corner.
         let before = heading(from, tool) - outward;
-        // Change of direction seen from the tool side, from -90 to 270 degrees.
+        // Change of direction seen from the tool side. Before an arc LinuxCNC adds a turn at most once.
         let mut beta = if side == Side::Left { before - along } else { along - before };
-        while beta > 1.5 * maths::PI {
+        if beta > 1.5 * maths::PI {
             beta -= maths::TAU;
         }
-        while beta < -QUARTER {
+        if beta < -QUARTER {
             beta += maths::TAU;
         }
-        let previous_arc = match out.queue.front() {
-            Some(Move::Arc { centre, end, turns, .. }) => Some((centre, end, turns)),
+        if arc.is_none() && beta < -QUARTER {
+            beta += maths::TAU;
+        }
+        let previous = match out.queue.front() {
+            Some(Move::Arc { centre, end, turns, .. }) => Some(CornerArc {
+                turns,
+                centre,
+                radius: distance(centre, [end[axes.first], end[axes.second]]),
+            }),
             _ => None,
         };
         let mut concave = !(-SMALL..=maths::PI + SMALL).contains(&beta);
         // Over a half circle and straight on beside it: stay on the outer side instead of looping.
-        if corner.turns.is_none()
-            && beta > maths::PI - SMALL
-            && let Some((_, _, turns)) = previous_arc
-            && !inside(side, turns)
-        {
-            concave = true;
+        match (arc, previous) {
+            (Some(arc), _) => concave |= (beta - maths::PI).abs() < SMALL && !inside(side, arc.turns),
+            (None, Some(arc)) => concave |= beta > maths::PI - SMALL && !inside(side, arc.turns),
+            (None, None) => {}
         }
         if concave {
-            let cut = self.inside_corner(
-                corner,
-                before,
-                beta,
-                previous_arc.map(|(c, e, t)| (c, [e[axes.first], e[axes.second]], t)),
-            );
+            let cut = match (previous, arc) {
+                (None, None) => self.cut_of_lines(before, beta),
+                (None, Some(arc)) => self.cut_of_line_and_arc(&arc, side, before, beta),
+                (Some(previous), None) => self.cut_of_arc_and_line(&previous, corner),
+                (Some(previous), Some(arc)) => self.cut_of_arcs(&previous, &arc, side),
+            };
             let Some(cut) = cut else {
                 return Err(Error { kind: ErrorKind::CcConcave, span: block.span() });
             };
             return self.end_at(cut, block, out);
         }
-        self.end_at(tool, block, out)?;
-        if beta > SMALL {
-            // The height and the other axes do not move along.
-            let mut end = self.position;
-            (end[axes.first], end[axes.second]) = (middle[0], middle[1]);
-            if corner.traverse {
-                let direction = [maths::cos(along), maths::sin(along)];
-                out.queue.push_move(Move::Straight { traverse: true, direction, end }, out.span);
-            } else {
-                let turns = if side == Side::Left { -1 } else { 1 };
-                out.queue.push_move(Move::Arc { sweep: 0.0, end, centre: from, turns }, out.span);
-            }
-            out.flush();
-            self.cutter.begin = Some(middle);
+        if beta <= SMALL {
+            self.let_go(out);
+            self.cutter.begin = Some(tool);
+            return Ok(());
         }
+        match arc {
+            None => self.end_at(tool, block, out)?,
+            Some(_) => self.let_go(out),
+        }
+        // The height does not move along; the rotary axes and U V W do (checked with rs274 2.9).
+        let mut end = corner.end;
+        end[axes.normal] = self.position[axes.normal];
+        (end[axes.first], end[axes.second]) = (middle[0], middle[1]);
+        if corner.traverse {
+            out.queue.push_move(Move::Straight { traverse: true, direction: [0.0; 2], end }, out.span);
+        } else {
+            let turns = if side == Side::Left { -1 } else { 1 };
+            out.queue.push_move(Move::Arc { sweep: 0.0, end, centre: from, turns }, out.span);
+        }
+        out.flush();
+        self.cutter.begin = Some(middle);
         Ok(())
     }
 
-    /// Where the offsets of the moves before and after an inside corner cut; nearest to the corner.
-    fn inside_corner(
-        &self,
-        corner: &Corner,
-        before: f64,
-        beta: f64,
-        previous_arc: Option<(Point, Point, i32)>,
-    ) -> Option<Point> {
-        let radius = self.cutter.radius;
-        let tool = self.cutter.tool;
-        match (previous_arc, corner.centre) {
-            (None, None) => {
-                // Half the angle of the corner; the line before retreats by r / tan of it.
-                let half = (beta + maths::PI) / 2.0;
-                if half == 0.0 {
-                    return None;
-                }
-                Some(beside(tool, before + maths::PI, radius / maths::tan(half)))
-            }
-            (None, Some((centre, size))) => {
-                // Backwards it is an arc that a line follows: the turn changes its sense and the tool its side.
-                let turns = -corner.turns.unwrap_or(1);
-                let flipped = if corner.side == Side::Left { Side::Right } else { Side::Left };
-                arc_then_line(centre, size, radius, corner.from, before + maths::PI, turns, flipped)
-            }
-            (Some((centre, end, turns)), None) => {
-                let size = distance(centre, end);
-                arc_then_line(centre, size, radius, corner.from, corner.along, turns, corner.side)
-            }
-            (Some((first, end, _)), Some((second, size))) => {
-                // The triangle of both centres and the cut: law of cosines at the first centre. Of the two cuts the
-                // one nearer to the corner.
-                let (old, gap) = (distance(first, end), distance(first, second));
-                let cosine = (old * old + gap * gap - size * size) / (2.0 * old * gap);
-                if !(-1.0..=1.0).contains(&cosine) {
-                    return None;
-                }
-                let (towards, opening) = (heading(first, second), maths::acos(cosine));
-                let [a, b] = [towards + opening, towards - opening].map(|angle| beside(first, angle, old));
-                Some(if distance(a, corner.from) <= distance(b, corner.from) { a } else { b })
-            }
-        }
+    /// Half the angle of the corner; the line before retreats by r / tan of it.
+    fn cut_of_lines(&self, before: f64, beta: f64) -> Option<Point> {
+        let half = (beta + maths::PI) / 2.0;
+        (half != 0.0)
+            .then(|| beside(self.cutter.tool, before + maths::PI, self.cutter.radius / maths::tan(half)))
     }
+
+    /// The line's offset runs at a known distance from the arc's centre: programmed it is R cos beta.
+    fn cut_of_line_and_arc(&self, arc: &CornerArc, side: Side, before: f64, beta: f64) -> Option<Point> {
+        let radius = self.cutter.radius;
+        let from_line = -arc.radius * maths::cos(beta);
+        let turn = if arc.turns > 0 { 1.0 } else { -1.0 };
+        let (size, ratio) = if inside(side, arc.turns) {
+            (arc.radius - radius, (from_line + radius) / (arc.radius - radius))
+        } else {
+            (arc.radius + radius, (from_line - radius) / (arc.radius + radius))
+        };
+        let bow = turn * angle(ratio)?.0;
+        let direction = if inside(side, arc.turns) { before + bow } else { before + maths::PI - bow };
+        Some(beside(arc.centre, direction, size))
+    }
+
+    /// `previous` is the offset arc. Its centre's distance from the line, then from the line's offset.
+    fn cut_of_arc_and_line(&self, previous: &CornerArc, corner: &Corner) -> Option<Point> {
+        let radius = self.cutter.radius;
+        let Corner { from, along, side, .. } = *corner;
+        let is_inside = inside(side, previous.turns);
+        let square_to = if previous.turns > 0 { along + QUARTER } else { along - QUARTER };
+        let programmed = if is_inside { previous.radius + radius } else { previous.radius - radius };
+        let from_line = programmed * maths::cos(square_to - heading(from, previous.centre));
+        let from_offset = if is_inside { from_line - radius } else { from_line + radius };
+        let opening = angle(from_offset / previous.radius)?.1;
+        let opening = if is_inside == (previous.turns > 0) { -opening } else { opening };
+        Some(beside(previous.centre, opening + square_to + maths::PI, previous.radius))
+    }
+
+    /// The triangle of both centres and the cut: law of cosines at the first centre. Which of the two cuts it is follows
+    /// from the turning senses, not from the distance to the corner (checked with rs274 2.9).
+    fn cut_of_arcs(&self, previous: &CornerArc, arc: &CornerArc, side: Side) -> Option<Point> {
+        let radius = self.cutter.radius;
+        let size = if inside(side, arc.turns) { arc.radius - radius } else { arc.radius + radius };
+        let (old, gap) = (previous.radius, distance(previous.centre, arc.centre));
+        let opening = angle((old * old + gap * gap - size * size) / (2.0 * old * gap))?.1;
+        let opening = if inside(side, previous.turns) == (arc.turns > 0) { opening } else { -opening };
+        Some(beside(previous.centre, heading(previous.centre, arc.centre) + opening, old))
+    }
+}
+
+/// Arc sine and arc cosine of a ratio; `None` where there is no such angle.
+fn angle(ratio: f64) -> Option<(f64, f64)> {
+    (-1.0..=1.0).contains(&ratio).then(|| (maths::asin(ratio), maths::acos(ratio)))
+}
+
+/// An arc beside a corner.
+#[derive(Debug, Clone, Copy)]
+struct CornerArc {
+    turns: i32,
+    centre: Point,
+    radius: f64,
 }
 
 /// A corner of the programmed path.
@@ -406,33 +455,9 @@ struct Corner {
     side: Side,
     /// From the direction of travel to the tool: a quarter turn left or right.
     outward: f64,
-    /// Turning sense of the arc that follows, if one does.
-    turns: Option<i32>,
     traverse: bool,
-    /// The offset arc that follows: centre and radius.
-    centre: Option<(Point, f64)>,
-}
-
-/// Where the offset of an arc (`size` = its radius) meets the offset of the line that follows in direction `along`.
-/// `None` where they do not meet.
-fn arc_then_line(
-    centre: Point,
-    size: f64,
-    radius: f64,
-    corner: Point,
-    along: f64,
-    turns: i32,
-    side: Side,
-) -> Option<Point> {
-    let square_to = if turns > 0 { along + QUARTER } else { along - QUARTER };
-    let is_inside = inside(side, turns);
-    // Distance of the centre from the line, then from its offset.
-    let from_line = distance(centre, corner) * maths::cos(square_to - heading(corner, centre));
-    let from_offset = if is_inside { from_line - radius } else { from_line + radius };
-    let ratio = from_offset / size;
-    if !(-1.0..=1.0).contains(&ratio) {
-        return None;
-    }
-    let opening = if is_inside == (turns > 0) { -maths::acos(ratio) } else { maths::acos(ratio) };
-    Some(beside(centre, opening + square_to + maths::PI, size))
+    /// Where the move after the corner ends.
+    end: [f64; 9],
+    /// The programmed arc that follows, if one does.
+    arc: Option<CornerArc>,
 }

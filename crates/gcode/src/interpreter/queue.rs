@@ -39,6 +39,8 @@ pub(crate) struct Queue {
     text: Vec<u8, MAX_TEXT>,
     /// More was to wait than there is room for.
     pub(crate) overflow: bool,
+    /// The first of the moves that went out last.
+    last: Option<Move>,
     /// Lathe tools: what is added to Z and X of a move.
     pub(crate) shift: [f64; 2],
 }
@@ -66,11 +68,12 @@ impl Queue {
         self.waiting.is_empty()
     }
 
-    /// The move that waits first.
+    /// The move that waits first; if none waits, the one that was first last (so does LinuxCNC, by accident).
     pub(crate) fn front(&self) -> Option<Move> {
         match self.waiting.first() {
             Some((Waiting::Move(waiting), _)) => Some(*waiting),
-            _ => None,
+            Some(_) => None,
+            None => self.last,
         }
     }
 
@@ -116,6 +119,7 @@ impl Queue {
 
     /// Everything goes out in its order.
     pub(crate) fn flush(&mut self, sink: &mut dyn CanonSink) {
+        self.last = self.front();
         for (waiting, span) in &self.waiting {
             let shifted = |mut end: [f64; 9]| {
                 end[2] += self.shift[0];
