@@ -25,6 +25,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         start: Pose { x: 10.0, ..Pose::ZERO },
         servo_period_ns: 1_000_000,
         timer_period_ns: 1000,
+        spindle: None,
+        workpiece: Vec::new(),
     })?;
     let mut vcd = VcdWriter::new(stdout().lock(), &simulation);
     for tick in 1..=2000 {

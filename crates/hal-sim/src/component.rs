@@ -1,5 +1,6 @@
 //! What a component is, what it sees of a period, and how it refuses.
 
+use crate::components::spindle::SpindleCommand;
 use crate::values::Values;
 use pkm_kins::{Joints, Pose};
 use pkm_stepgen::{EdgeError, Period};
@@ -18,12 +19,43 @@ pub struct Setpoint {
     pub line: u32,
     /// No motion is under way and none is waiting.
     pub in_position: bool,
+    /// What the spindle is to do in this period.
+    pub spindle: SpindleCommand,
+}
+
+/// What the encoder and the drive of the spindle tell.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SpindleFeedback {
+    /// Turns since the last index that was waited for; negative = counter-clockwise.
+    pub revs: f64,
+    /// Turns a second.
+    pub speed_rps: f64,
+    /// As fast as commanded.
+    pub at_speed: bool,
+    /// Still waiting for the index.
+    pub index_enable: bool,
+    /// At the angle that M19 asked for.
+    pub is_oriented: bool,
+}
+
+/// What the machine tells the motion controller at the end of a period.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Feedback {
+    /// Of the spindle, if there is one.
+    pub spindle: SpindleFeedback,
+    /// `motion.probe-input`
+    pub probe: bool,
 }
 
 /// Where setpoints come from: a planner, a table, a test.
 pub trait SetpointSource {
     /// Why there is none.
     type Error;
+
+    /// What the machine tells, before each setpoint; a source that does not listen need not.
+    fn feedback(&mut self, feedback: &Feedback) {
+        let _ = feedback;
+    }
 
     /// The setpoint for the end of servo period `tick`, counted from 1.
     ///

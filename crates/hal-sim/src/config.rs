@@ -1,9 +1,11 @@
 //! What a simulated machine is made of, and how it is wired.
 
+use crate::components::probe::{Probe, Solid};
+use crate::components::spindle::{Spindle, SpindleConfig};
 use crate::hal::Hal;
 use crate::hal_error::HalError;
 use pkm_kins::maths::PI;
-use pkm_kins::{AxisSet, JointKind, JointRange, MAX_JOINTS, Pose};
+use pkm_kins::{Axis, AxisSet, JointKind, JointRange, MAX_JOINTS, Pose};
 use pkm_stepgen::{EdgeError, PulseTimingNs};
 use std::fmt;
 
@@ -39,6 +41,10 @@ pub struct SimulationConfig {
     pub servo_period_ns: u64,
     /// Unit of all edge times, ns.
     pub timer_period_ns: u64,
+    /// The spindle, if there is one.
+    pub spindle: Option<SpindleConfig>,
+    /// What the probe can touch; nothing: no probe is wired.
+    pub workpiece: Vec<Solid>,
 }
 
 /// Why a machine cannot be wired.
@@ -114,4 +120,25 @@ pub(crate) fn wire(hal: &mut Hal, joints: usize) -> Result<(), HalError> {
         hal.addf(function, THREAD)?;
     }
     Ok(())
+}
+
+/// Spindle and probe, behind everything else.
+pub(crate) fn wire_spindle_and_probe(hal: &mut Hal, config: &SimulationConfig) -> Result<(), HalError> {
+    if let Some(spindle) = &config.spindle {
+        Spindle::load(hal, spindle)?;
+        hal.addf("spindle.0.update", THREAD)?;
+    }
+    if config.workpiece.is_empty() {
+        return Ok(());
+    }
+    Probe::load(hal, &config.workpiece)?;
+    for (letter, axis) in [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)] {
+        // An axis that the machine has not stays at 0.
+        if config.axes.contains(axis) {
+            let pins = [format!("axis.{letter}.pos-cmd"), format!("probe.0.{letter}")];
+            hal.net(&format!("tool-{letter}"), &[&pins[0], &pins[1]])?;
+        }
+    }
+    hal.net("probe", &["probe.0.tripped", "motion.probe-input"])?;
+    hal.addf("probe.0.update", THREAD)
 }

@@ -34,8 +34,11 @@ pub mod trace;
 pub mod values;
 pub mod vcd;
 
-pub use component::{Component, Fault, PinIndex, PinName, Setpoint, SetpointSource, Tick};
+pub use component::{
+    Component, Fault, Feedback, PinIndex, PinName, Setpoint, SetpointSource, SpindleFeedback, Tick,
+};
 pub use components::driver::Violations;
+pub use components::spindle::{Orient, SpindleCommand, SpindleConfig, SpindleModel};
 pub use config::{ConfigError, JointConfig, SimulationConfig};
 pub use faults::{FaultKind, FaultTextError, PinFault};
 pub use hal::{Hal, MAX_NAME, Role};

@@ -1,6 +1,6 @@
 //! What a simulated machine tells: after each period, and in all.
 
-use crate::component::Setpoint;
+use crate::component::{Feedback, Setpoint};
 use crate::components::driver::Violations;
 use pkm_stepgen::Edge;
 
@@ -28,6 +28,8 @@ pub struct TickReport<'a> {
     pub setpoint: &'a Setpoint,
     /// In joint order.
     pub joints: &'a [JointState],
+    /// What spindle and probe tell.
+    pub feedback: Feedback,
 }
 
 /// Sees everything that the machine does: for each period first its edges in order of time, then the report.

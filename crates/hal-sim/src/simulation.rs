@@ -3,12 +3,15 @@
 //! Everything goes through the HAL's pins; [`Simulation::hal`] shows them. What is *reported* comes from the edges: the
 //! simulation counts them itself, apart from generator and driver.
 
-use crate::component::{Fault, Setpoint, SetpointSource};
+use crate::component::{Fault, Feedback, Setpoint, SetpointSource};
 use crate::components::driver::{Driver, DriverChannel, Drivers};
 use crate::components::motion::{Motion, MotionJoint};
 use crate::components::motor::{MotorChannel, Motors};
+use crate::components::spindle::Spindle;
 use crate::components::stepgen::{Stepgen, StepgenChannel, StepgenError};
-use crate::config::{ConfigError, JointConfig, SimulationConfig, THREAD, shown_scale, wire};
+use crate::config::{
+    ConfigError, JointConfig, SimulationConfig, THREAD, shown_scale, wire, wire_spindle_and_probe,
+};
 use crate::hal::Hal;
 use crate::hal_error::HalError;
 use crate::report::{JointState, JointStatistics, Observer, TickReport};
@@ -55,6 +58,7 @@ struct Lines {
 /// Places of the components in the HAL, in order of loading.
 const STEPGEN: usize = 1;
 const DRIVER: usize = 2;
+const SPINDLE: usize = 4;
 
 /// The simulated machine. `Clone` forks it.
 #[derive(Clone)]
@@ -68,6 +72,8 @@ pub struct Simulation {
     servo_period_ns: u64,
     axes: AxisSet,
     enable: BitPin,
+    probe_input: BitPin,
+    has_spindle: bool,
     tick: u64,
     /// Edges of the period in order of time, per joint and of all.
     joint_edges: Vec<Vec<Edge>>,
@@ -123,10 +129,13 @@ impl Simulation {
         Drivers::load(&mut hal, &drivers)?;
         Motors::load(&mut hal, &motors)?;
         wire(&mut hal, count)?;
+        wire_spindle_and_probe(&mut hal, config)?;
 
         let mut simulation = Self {
             lines: lines(&hal, config)?,
             enable: hal.bit_pin("motion.enable")?,
+            probe_input: hal.bit_pin("motion.probe-input")?,
+            has_spindle: config.spindle.is_some(),
             hal,
             states: vec![JointState::default(); count],
             statistics: vec![JointStatistics::default(); count],
@@ -161,6 +170,7 @@ impl Simulation {
         source: &mut S,
         observers: &mut [&mut dyn Observer],
     ) -> Result<TickReport<'_>, TickError<S::Error>> {
+        source.feedback(&self.feedback_now());
         let setpoint = source.next(self.tick + 1).map_err(TickError::Source)?;
         self.tick_to(&setpoint, observers).map_err(TickError::Fault)
     }
@@ -241,6 +251,7 @@ impl Simulation {
             time_ns: self.tick * self.servo_period_ns,
             setpoint: &self.setpoint,
             joints: &self.states,
+            feedback: self.feedback_now(),
         };
         for observer in observers {
             observer.tick(&report);
@@ -329,6 +340,7 @@ impl Simulation {
             time_ns: self.tick * self.servo_period_ns,
             setpoint: &self.setpoint,
             joints: &self.states,
+            feedback: self.feedback_now(),
         }
     }
 
@@ -352,6 +364,20 @@ impl Simulation {
             *joint = if line.kind == JointKind::Rotary { radians(position) } else { position };
         }
         kinematics.forward(&joints, &self.setpoint.pose)
+    }
+
+    /// What spindle and probe tell.
+    fn feedback_now(&self) -> Feedback {
+        let spindle = match self.has_spindle {
+            true => part::<Spindle>(&self.hal, SPINDLE).feedback(),
+            false => Default::default(),
+        };
+        Feedback { spindle, probe: self.hal.values().bit(self.probe_input) }
+    }
+
+    /// True if the machine has a spindle.
+    pub const fn has_spindle(&self) -> bool {
+        self.has_spindle
     }
 
     /// What the joints did so far.

@@ -1,11 +1,11 @@
 //! `trace.csv`: one row per servo period, the first for the start.
 //!
 //! Columns: `tick,time_s,line`, then `axis.x.pos-cmd_mm` for each coordinate of the machine (`_deg` for A, B, C), then for
-//! each joint `joint.0.pos-cmd_mm` and `joint.0.pos-fb_mm` (counted from the edges; `_deg` for rotary joints). Numbers are
+//! each joint `joint.0.pos-cmd_mm` and `joint.0.pos-fb_mm` (counted from the edges; `_deg` for rotary joints), then, if the
+//! machine has a spindle, `spindle.0.revs` (turns since the last index that was waited for). Numbers are
 //! the shortest that read back to the same `f64`; lines end with LF.
 
-use crate::component::Setpoint;
-use crate::report::{JointState, Observer, TickReport};
+use crate::report::{Observer, TickReport};
 use crate::simulation::Simulation;
 use pkm_kins::{Axis, JointKind, maths};
 use pkm_stepgen::Edge;
@@ -65,6 +65,7 @@ pub struct TraceWriter<W: Write> {
     out: Output<W>,
     axes: Vec<Axis>,
     rotary: Vec<bool>,
+    has_spindle: bool,
 }
 
 impl<W: Write> TraceWriter<W> {
@@ -87,25 +88,33 @@ impl<W: Write> TraceWriter<W> {
             column(format!("joint.{n}.pos-cmd_{unit}"));
             column(format!("joint.{n}.pos-fb_{unit}"));
         }
+        let has_spindle = simulation.has_spindle();
+        if has_spindle {
+            column("spindle.0.revs".to_owned());
+        }
         out.text.push(b'\n');
-        let mut trace = Self { out, axes, rotary };
+        let mut trace = Self { out, axes, rotary, has_spindle };
         let report = simulation.report();
-        trace.row(report.tick, report.time_ns as f64 / 1e9, report.setpoint, report.joints);
+        trace.row(&report);
         trace
     }
 
-    fn row(&mut self, tick: u64, time_s: f64, setpoint: &Setpoint, joints: &[JointState]) {
+    fn row(&mut self, report: &TickReport<'_>) {
+        let TickReport { setpoint, joints, .. } = report;
         let text = &mut self.out.text;
-        text.extend_from_slice(itoa::Buffer::new().format(tick).as_bytes());
-        number(text, time_s);
+        text.extend_from_slice(itoa::Buffer::new().format(report.tick).as_bytes());
+        number(text, report.time_ns as f64 / 1e9);
         text.push(b',');
         text.extend_from_slice(itoa::Buffer::new().format(setpoint.line).as_bytes());
         for &axis in &self.axes {
             number(text, shown(axis.is_rotary(), setpoint.pose.get(axis)));
         }
-        for (&rotary, joint) in self.rotary.iter().zip(joints) {
+        for (&rotary, joint) in self.rotary.iter().zip(*joints) {
             number(text, shown(rotary, joint.commanded));
             number(text, shown(rotary, joint.position));
+        }
+        if self.has_spindle {
+            number(text, report.feedback.spindle.revs);
         }
         text.push(b'\n');
         self.out.spill();
@@ -144,6 +153,6 @@ impl<W: Write> Observer for TraceWriter<W> {
     fn edge(&mut self, _edge: &Edge) {}
 
     fn tick(&mut self, report: &TickReport<'_>) {
-        self.row(report.tick, report.time_ns as f64 / 1e9, report.setpoint, report.joints);
+        self.row(report);
     }
 }

@@ -177,5 +177,7 @@ fn simulation_config(machine: &Machine, start: Pose, substeps: u64) -> Simulatio
         start,
         servo_period_ns: machine.servo_period_ns / substeps,
         timer_period_ns: machine.timer_period_ns,
+        spindle: None,
+        workpiece: Vec::new(),
     }
 }

@@ -15,6 +15,7 @@
 //! | `motion.enable`          | bit in    | false (emergency stop): drives off, commands follow `motor-pos-fb` |
 //! | `motion.in-position`     | bit out   | nothing moves and nothing is waiting                       |
 //! | `motion.program-line`    | s32 out   | line of the block under way                                |
+//! | `motion.probe-input`     | bit in    | the probe touches: read by the planner                     |
 //!
 //! Functions: `motion-command-handler` (nothing to do here, kept for HAL files), `motion-controller`.
 //!
@@ -126,6 +127,7 @@ impl Motion {
             let name = format!("axis.{}.pos-cmd", axis.letter().to_ascii_lowercase());
             axis_pins.push((axis, hal.new_float("motion", &name, Role::Out, 0.0)?));
         }
+        hal.new_bit("motion", "motion.probe-input", Role::In, false)?;
         let motion = Self {
             joints: with_pins,
             axes: axis_pins,

@@ -26,6 +26,8 @@ pub fn config(joints: usize, timer_period_ns: u64) -> SimulationConfig {
         start: Pose::ZERO,
         servo_period_ns: SERVO_NS,
         timer_period_ns,
+        spindle: None,
+        workpiece: Vec::new(),
     }
 }
 
