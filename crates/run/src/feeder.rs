@@ -430,6 +430,7 @@ impl SetpointSource for Feeder<'_> {
             velocities: setpoint.joint_velocity,
             line: setpoint.span.line,
             in_position: setpoint.state == State::Idle,
+            spindle: Default::default(),
         })
     }
 }
