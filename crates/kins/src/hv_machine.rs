@@ -127,6 +127,11 @@ impl HvMachine {
         })
     }
 
+    /// H and V.
+    pub fn mechanisms(&self) -> [&HvMill; 2] {
+        [&self.h, &self.v]
+    }
+
     /// The mechanism that follows the program.
     pub fn active(&self) -> Spindle {
         self.active

@@ -394,8 +394,8 @@ impl HvMill {
         Ok(self.place(self.mechanism.planar.forward([p1, p2])?, p3, p4, p5))
     }
 
-    /// The tip in {W} for the 4S's tip at q (as with p5 = 0).
-    fn place(&self, q: Vec2, p3: f64, table: f64, head: f64) -> HvState {
+    /// The tip in {W} for the 4S's tip at q (as with p5 = 0), the carriage at p3 (mm), table and head (rad).
+    pub fn place(&self, q: Vec2, p3: f64, table: f64, head: f64) -> HvState {
         let (s, c) = sincos(self.table_sense * table);
         let tilted = if self.controlled_axes == 5 {
             Turn::Y.rotate(sincos(self.head_sense * head), self.r_t)

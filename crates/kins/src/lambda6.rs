@@ -178,6 +178,21 @@ pub struct Lambda6 {
     sigma_min: f64,
 }
 
+/// One leg as pictures and maps need it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lambda6Leg {
+    /// Its shaft in the base plane, mm.
+    pub shaft_mm: [f64; 2],
+    /// Its platform joint in the platform's frame, mm.
+    pub joint_mm: [f64; 2],
+    /// c, mm.
+    pub long_mm: f64,
+    /// u, mm.
+    pub short_mm: f64,
+    /// k = e/c: where the short chain meets the long one, as a share of c from the upper slider.
+    pub ratio: f64,
+}
+
 /// One solved leg of the inverse.
 #[derive(Debug, Clone, Copy, Default)]
 struct LegState {
@@ -306,6 +321,27 @@ impl Lambda6 {
         self
     }
 
+    /// The three legs.
+    pub fn legs(&self) -> [Lambda6Leg; 3] {
+        self.legs.map(|leg| Lambda6Leg {
+            shaft_mm: leg.shaft,
+            joint_mm: leg.joint,
+            long_mm: leg.c,
+            short_mm: leg.u,
+            ratio: leg.k,
+        })
+    }
+
+    /// Smallest and largest distance of the two sliders of a shaft, mm (infinite without limit).
+    pub fn spacing_mm(&self) -> [f64; 2] {
+        self.spacing
+    }
+
+    /// True if the angle between long chain and platform normal is limited.
+    pub fn has_cone(&self) -> bool {
+        self.cone_cos > -1.5
+    }
+
     /// Radius of the platform joints, mm: what makes angular columns of the Jacobian comparable with the linear ones.
     pub fn platform_radius_mm(&self) -> f64 {
         self.platform_radius
@@ -372,7 +408,7 @@ impl Lambda6 {
         for (leg, number) in legs.iter().zip(0u8..) {
             self.within(number, leg.lower - leg.upper)?;
         }
-        if self.cone_cos > -1.5 {
+        if self.has_cone() {
             return self.check_cone(legs, at);
         }
         Ok(())

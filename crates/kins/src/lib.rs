@@ -40,13 +40,13 @@ pub use kinematics::{
     Branches, Jacobian, JointKind, JointLimit, JointMotion, JointRange, Joints, Kinematics, LimitCode,
     MAX_JOINTS, Side, Singularity,
 };
-pub use lambda6::{Lambda6, Lambda6Parameters, Lambda6Set};
+pub use lambda6::{Lambda6, Lambda6Leg, Lambda6Parameters, Lambda6Set};
 pub use linear_delta::{LinearDelta, LinearDeltaParameters};
 pub use machine::Mechanism;
 pub use moma::{Moma, MomaConfiguration, MomaParameters};
 pub use moma_4s::{Moma4s, Moma4sConfiguration, Moma4sParameters};
 pub use moma_w::{MomaW, MomaWParameters};
 pub use ox_glide::{FormSwitch, FormSwitchError, OxForm, OxGlide, OxGlideParameters};
-pub use planar::{Planar, PlanarParameters, PlanarState, Vec2};
+pub use planar::{Planar, PlanarChain, PlanarParameters, PlanarState, Vec2};
 pub use pose::{Axis, AxisSet, Pose};
 pub use vector::Vec3;

@@ -146,6 +146,11 @@ impl MomaW {
         &self.mechanisms
     }
 
+    /// b and w, mm, and D, mm.
+    pub fn frames_mm(&self) -> ([f64; 3], [f64; 3], f64) {
+        (self.b, self.w, self.d)
+    }
+
     /// The same machine without limits on the wire's length and tilt: geometry alone.
     pub fn without_limits(mut self) -> Self {
         self.max_lean_mm = f64::INFINITY;

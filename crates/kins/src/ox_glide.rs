@@ -164,6 +164,11 @@ impl OxGlide {
         self.form
     }
 
+    /// l, s and c_min, mm.
+    pub fn dimensions_mm(&self) -> [f64; 3] {
+        [self.l, self.s, self.c_min]
+    }
+
     /// The same machine without the guard around the form switch (derivatives still end at c = 0).
     pub fn without_limits(mut self) -> Self {
         self.c_min = 0.0;

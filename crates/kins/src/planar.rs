@@ -98,7 +98,26 @@ pub struct Planar {
     far_edge: f64,
     fold_edge: f64,
     near: f64,
+    /// Platform joints minus T, which only pictures need.
+    offsets: [Vec2; 2],
     one_sided: bool,
+}
+
+/// One chain as pictures and maps need it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanarChain {
+    /// Rᵢ: the slider's joint at pᵢ = 0, mm.
+    pub reference_mm: Vec2,
+    /// aᵢ: unit vector along the guide.
+    pub direction: Vec2,
+    /// oᵢ: platform joint minus controlled point, mm.
+    pub offset_mm: Vec2,
+    /// lᵢ, mm.
+    pub link_mm: f64,
+    /// σᵢ = ±1.
+    pub working_mode: f64,
+    /// mᵢ = ±1: the inner side of the guide is where mᵢ cross(aᵢ, T + oᵢ − Rᵢ) ≥ 0; 0 if it has none.
+    pub inward: f64,
 }
 
 /// The solved inverse: everything the derivatives need.
@@ -238,6 +257,7 @@ impl Planar {
             far_edge: -2.0 * EDGE * far * far,
             fold_edge: -2.0 * EDGE * far * fabs(fold),
             near: EDGE * far * (EDGE * far),
+            offsets: [o1, o2],
             one_sided: p.one_sided,
         })
     }
@@ -245,6 +265,29 @@ impl Planar {
     /// The links' lengths, mm.
     pub fn links_mm(&self) -> [f64; 2] {
         [self.chains[0].link, self.chains[1].link]
+    }
+
+    /// Both chains.
+    pub fn chains(&self) -> [PlanarChain; 2] {
+        let ([c1, c2], [o1, o2]) = (&self.chains, self.offsets);
+        [(c1, o1), (c2, o2)].map(|(c, offset)| PlanarChain {
+            reference_mm: along(c.origin, 1.0, offset),
+            direction: c.direction,
+            offset_mm: offset,
+            link_mm: c.link,
+            working_mode: c.mode,
+            inward: c.inward,
+        })
+    }
+
+    /// s = ±1.
+    pub fn assembly(&self) -> f64 {
+        self.assembly
+    }
+
+    /// Links may lie only on the inner side of their guides.
+    pub fn is_one_sided(&self) -> bool {
+        self.one_sided
     }
 
     /// T (mm) → p₁, p₂ (mm).
