@@ -105,16 +105,6 @@ impl Curve {
         }
     }
 
-    /// The same piece moved.
-    pub(crate) fn moved(self, by: Vec2) -> Self {
-        match self {
-            Self::Segment { from, to } => Self::Segment { from: plus(from, 1.0, by), to: plus(to, 1.0, by) },
-            Self::Arc { centre, u, v, start, end } => {
-                Self::Arc { centre: plus(centre, 1.0, by), u, v, start, end }
-            }
-        }
-    }
-
     /// ½ ∫ (x dy − y dx) along the piece: the areas of a closed loop's pieces sum up to its area (Green).
     pub(crate) fn area(&self) -> f64 {
         match *self {

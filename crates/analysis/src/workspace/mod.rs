@@ -51,6 +51,19 @@ pub struct View {
     pub(crate) factor: f64,
 }
 
+/// One chain of a mechanism in a pose, mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limb {
+    /// Joint number in the machine.
+    pub joint: usize,
+    /// Ends of the slider's travel.
+    pub guide: [Vec2; 2],
+    /// The slider.
+    pub slider: Vec2,
+    /// The platform's joint, at the other end of the link.
+    pub platform: Vec2,
+}
+
 /// A planar mechanism in a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pair {
@@ -170,9 +183,25 @@ impl Region {
 }
 
 impl View {
-    /// det ∂p/∂(plane), continued beyond the reachable set; see [`Pair::determinant`].
-    pub(crate) fn determinant(&self, t: Vec2) -> f64 {
+    /// det ∂p/∂(plane), dimensionless, continued beyond the reachable set: past a singularity of type 1 it keeps the last
+    /// finite value.
+    pub fn determinant(&self, t: Vec2) -> f64 {
         self.mechanisms.iter().map(|pair| pair.determinant(t)).product::<f64>() * self.factor
+    }
+
+    /// The mechanism in the pose T (mm), chain by chain; `None` out of reach.
+    pub fn linkage(&self, t: Vec2) -> Option<Vec<Limb>> {
+        let limb = |chain: &Chain| {
+            let (p, _) = chain.solve(t)?;
+            let range = chain.range;
+            Some(Limb {
+                joint: chain.joint,
+                guide: [chain.slider(range.min), chain.slider(range.max)],
+                slider: chain.slider(p),
+                platform: [t[0] + chain.offset[0], t[1] + chain.offset[1]],
+            })
+        };
+        self.mechanisms.iter().flat_map(|pair| &pair.chains).map(limb).collect()
     }
 
     /// A view of one planar mechanism.
