@@ -198,9 +198,18 @@ fn run<const R: usize>(known: &Known, clock_ns: f64) -> Run {
     let passes = (0..101).map(|_| {
         factor = 1.999 - factor;
         let before = held.work().planned;
-        let begin = Instant::now();
         held.set_feed_override(factor);
-        since(begin) / (held.work().planned - before).max(1) as f64
+        let (mut spent_ns, mut last) = (0.0, before);
+        loop {
+            let begin = Instant::now();
+            let _ = std::hint::black_box(held.tick());
+            spent_ns += since(begin) - setpoint_ns;
+            let planned = held.work().planned;
+            if planned == last {
+                break spent_ns / (planned - before).max(1) as f64;
+            }
+            last = planned;
+        }
     });
     let look_ahead_ns = median(passes.collect());
     let grid_ns = (filled_ns - f64::from(empties) * setpoint_ns - filled.planned as f64 * look_ahead_ns)

@@ -42,6 +42,8 @@ pub(crate) struct Executor {
     abort: bool,
     feed_override: f64,
     rapid_override: f64,
+    /// Nodes passed ([`crate::Work`]) when the last servo period began.
+    passed_before: u64,
 }
 
 impl Executor {
@@ -59,6 +61,7 @@ impl Executor {
             abort: false,
             feed_override: 1.0,
             rapid_override: 1.0,
+            passed_before: 0,
         }
     }
 
@@ -79,6 +82,11 @@ impl Executor {
 
     pub(crate) fn overrides(&self) -> (f64, f64) {
         (self.feed_override, self.rapid_override)
+    }
+
+    /// What is permitted has changed: the rest of the interval is planned again.
+    pub(crate) fn replan(&mut self) {
+        self.planned = false;
     }
 }
 
@@ -104,7 +112,6 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             self.executor.feed_override = feed;
             self.executor.rapid_override = rapid;
             self.executor.planned = false;
-            self.look_ahead_anew();
         }
         true
     }
@@ -132,7 +139,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let held = self.executor.hold || self.executor.abort;
         if self.executor.substep == 0 {
             // A fault only ends the queue: what is known is still driven to its end, at rest.
-            let _ = self.refill();
+            let passed = (self.work.passed - self.executor.passed_before) as usize;
+            self.executor.passed_before = self.work.passed;
+            let _ = self.refill(passed);
             self.release_if_starving();
             self.begin_period(held);
         }
@@ -190,9 +199,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let last = self.first_piece + (self.pieces.len() as u64).saturating_sub(1);
         let all_known =
             self.grid.piece == last && self.pieces.back().is_some_and(|p| p.open && self.grid.s >= p.to);
-        if all_known && self.grid.planned >= self.nodes.len() && self.brakes_now() {
+        let all_planned = self.grid.planned >= self.nodes.len() && !self.grid.is_planning();
+        if all_known && all_planned && self.brakes_now() {
             self.finish();
-            let _ = self.refill();
+            let _ = self.refill(0);
         }
     }
 
@@ -203,16 +213,18 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         // The interval being driven counts as driven.
         let mut x = self.executor.legs.last().map_or(self.executor.x, |leg| leg.x);
         let here = front.distance + self.executor.sigma;
+        let share = self.grid.share(1, (feed, rapid));
         let known = self.nodes.iter().skip(1);
         for (from, to) in known.zip(self.nodes.iter().skip(2)) {
             if from.distance > here + 2.0 * sqrt(x) * self.settings.servo_period_s {
                 return false;
             }
-            if x >= from.entry {
+            let entry = from.entry * share;
+            if x >= entry {
                 if from.distance > self.grid.settled {
                     return true;
                 }
-                x = from.entry;
+                x = entry;
             }
             x = exits(&from.right, &to.left, rows, from.length, x).1.min(to.cap(feed, rapid));
         }
@@ -274,7 +286,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn pass_node(&mut self) {
         self.nodes.pop_front();
         self.work.passed += 1;
-        self.grid.planned = self.grid.planned.saturating_sub(1);
+        self.grid.shift();
         let Some(front) = self.nodes.front() else { return };
         // The piece before stays: the setpoint of a stop at its end is still on it.
         while self.first_piece < front.piece && self.pieces.len() > 1 {
@@ -315,7 +327,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             // From the middle of an interval the strips, taken there anew, may exclude by a hair what is being driven;
             // that stays admissible.
             let (low, high) = running.map_or((low, high), |running| (low.min(running), high.max(running)));
-            let x_end = if low <= high { next.entry.clamp(low, high) } else { 0.5 * (low + high) };
+            let entry = (next.entry * self.grid.share(1, (feed, rapid))).min(next.cap(feed, rapid));
+            let x_end = if low <= high { entry.clamp(low, high) } else { 0.5 * (low + high) };
             if x == 0.0 && self.nodes.len() == 2 && self.pieces.back().is_some_and(|last| last.open) {
                 // At rest with one interval known and more to come.
                 return false;

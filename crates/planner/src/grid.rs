@@ -17,12 +17,15 @@ const CHANGE: f64 = 0.007;
 const NODES_PER_PERIOD: f64 = 16.0;
 /// The speed is held so low that no more than about twice this many nodes are passed in a servo period.
 const NODES_PER_TICK: usize = 64;
-/// Nodes added in one go: bounds the work of a tick.
-const BATCH: usize = NODES_PER_TICK;
-/// The look-ahead plans at least so many more nodes at a time.
+/// Nodes a push sets at most.
+pub(crate) const SET_PER_PUSH: usize = 64;
+/// Nodes a tick sets at most, unless it passes more: then as many as it passed. Room for fewer waits for more.
+const SET_PER_TICK: usize = 8;
+/// Nodes the look-ahead plans in a tick at most; a push grants it so many for each node it sets.
+const PLANNED_PER_TICK: usize = 64;
+const PLANNED_PER_SET: usize = 8;
+/// One pass of the look-ahead takes in at least so many new nodes, if there are as many.
 const STRETCH: usize = 4 * NODES_PER_TICK;
-/// Less room than this is not worth a walk.
-const WORTH: usize = 16;
 
 /// A point of the path where the speed is planned; the interval it begins reaches to the next node.
 #[derive(Debug, Clone, Copy)]
@@ -75,6 +78,25 @@ pub(crate) struct Grid<const R: usize> {
     depth: usize,
     /// As far as this (the nodes' `distance`) nothing depends on where the queue ends.
     pub(crate) settled: f64,
+    /// The overrides (feed, rapid) they were planned with.
+    overrides: (f64, f64),
+    /// The look-ahead under way.
+    pass: Option<Pass>,
+}
+
+/// A backward pass: from a stop at the last of `end` nodes to where nothing changes any more. It may rest between any
+/// two nodes: those it has not come to keep an older plan, which asks no more of those that follow than the new one
+/// grants.
+#[derive(Debug, Clone, Copy)]
+struct Pass {
+    /// Nodes taken in; the index of the one planned last; how many were planned before, with the same overrides.
+    end: usize,
+    next: usize,
+    known: usize,
+    /// Of these, planned again.
+    depth: usize,
+    settled: f64,
+    overrides: (f64, f64),
 }
 
 impl<const R: usize> Grid<R> {
@@ -87,34 +109,62 @@ impl<const R: usize> Grid<R> {
             planned: 0,
             depth: 0,
             settled: f64::NEG_INFINITY,
+            overrides: (1.0, 1.0),
+            pass: None,
         }
+    }
+
+    /// True while the look-ahead has not finished what it began.
+    pub(crate) fn is_planning(&self) -> bool {
+        self.pass.is_some()
+    }
+
+    /// The node at the front is passed.
+    pub(crate) fn shift(&mut self) {
+        self.planned = self.planned.saturating_sub(1);
+        if let Some(pass) = &mut self.pass {
+            pass.end = pass.end.saturating_sub(1);
+            pass.next = pass.next.saturating_sub(1);
+            pass.known = pass.known.saturating_sub(1);
+        }
+    }
+
+    /// The share of its planned entry at which node `index` may be passed now. A plan made with higher overrides is
+    /// admissible, feeds included, when it is driven slower throughout: x and s̈ by one factor (Pham & Pham 2018).
+    pub(crate) fn share(&self, index: usize, (feed, rapid): (f64, f64)) -> f64 {
+        let (planned_feed, planned_rapid) = match self.pass {
+            Some(pass) if index >= pass.next => pass.overrides,
+            _ => self.overrides,
+        };
+        let slower = |now: f64, planned: f64| if now < planned { now / planned } else { 1.0 };
+        let factor = slower(feed, planned_feed).min(slower(rapid, planned_rapid));
+        factor * factor
     }
 }
 
 impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Planner<K, R, PIECES, NODES> {
-    /// Cuts more of the path into nodes, if there is room for a batch or the machine would otherwise run dry.
-    pub(crate) fn refill(&mut self) -> Result<(), PlanError> {
-        if let Some(fault) = self.fault {
-            return Err(fault);
-        }
-        let worth = self.is_short() || self.nodes.len() + WORTH <= NODES;
-        let result = if worth { self.cut(BATCH) } else { Ok(()) };
-        self.look_ahead();
-        if let Err(fault) = result {
-            self.fault = Some(fault);
-        }
-        result
+    /// A tick's share of the work: what lies ahead is cut into nodes and planned, a little at a time.
+    pub(crate) fn refill(&mut self, passed: usize) -> Result<(), PlanError> {
+        let budget = passed.max(SET_PER_TICK);
+        let worth = self.nodes.len() + budget <= NODES;
+        self.extend(if worth { budget } else { 0 }, PLANNED_PER_TICK)
     }
 
-    /// True when so little is known that a push must not wait for the next tick.
-    pub(crate) fn is_short(&self) -> bool {
-        self.nodes.len() < BATCH
+    /// Sets at most `budget` nodes and plans at most `planned` of all.
+    pub(crate) fn extend(&mut self, budget: usize, planned: usize) -> Result<(), PlanError> {
+        let before = self.work.nodes;
+        if self.fault.is_none() && budget > 0 {
+            self.fault = self.cut(budget).err();
+        }
+        let set = self.work.nodes.wrapping_sub(before) as usize;
+        self.look_ahead(planned.max(set * PLANNED_PER_SET));
+        self.fault.map_or(Ok(()), Err)
     }
 
     fn cut(&mut self, budget: usize) -> Result<(), PlanError> {
         let target = (self.nodes.len() + budget).min(NODES);
-        // Every turn adds a node or goes on to the next piece, of which there are at most PIECES.
-        for _ in 0..budget + PIECES {
+        // Every turn adds a node or goes on to the next piece.
+        for _ in 0..2 * budget {
             if self.nodes.len() >= target {
                 break;
             }
@@ -256,64 +306,85 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         Ok(())
     }
 
-    /// Plans as far ahead as what the machine comes to soon depends on; the rest waits.
-    pub(crate) fn look_ahead(&mut self) {
-        // Every turn plans as much more as the last one had to plan again, so the turns about double: all in all no
-        // more than three times what the queue holds.
-        for _ in 0..NODES {
-            let soon = self.nodes.get(2 * NODES_PER_TICK).or(self.nodes.back());
-            if self.grid.planned >= self.nodes.len()
-                || soon.is_none_or(|node| self.grid.settled >= node.distance)
-            {
-                return;
-            }
-            let more = self.grid.depth.max(STRETCH);
-            self.pass(self.grid.planned, (self.grid.planned + more).min(self.nodes.len()));
+    /// Plans at most `budget` nodes, as far ahead as what the machine comes to soon depends on; the rest waits.
+    fn look_ahead(&mut self, mut budget: usize) {
+        while budget > 0 && (self.grid.pass.is_some() || self.begin_pass()) {
+            budget = self.continue_pass(budget);
         }
     }
 
-    /// The caps have changed: what was planned is void.
-    pub(crate) fn look_ahead_anew(&mut self) {
-        self.grid.planned = 0;
-        self.grid.settled = f64::NEG_INFINITY;
-        self.look_ahead();
+    /// Begins a pass if one is due: with other overrides over what is planned, else over more than that.
+    fn begin_pass(&mut self) -> bool {
+        let overrides = self.executor.overrides();
+        let (known, all) = (self.grid.planned, self.nodes.len());
+        let anew = self.grid.overrides != overrides;
+        if anew && known < 2 {
+            self.grid.overrides = overrides;
+            return self.begin_pass();
+        }
+        let soon = self.nodes.get(2 * NODES_PER_TICK).or(self.nodes.back());
+        let settled = soon.is_none_or(|node| self.grid.settled >= node.distance);
+        if !anew && (known >= all || settled) {
+            return false;
+        }
+        // Each pass takes in as much more as the last one had to plan again: all in all no more than about three times
+        // what the queue holds.
+        let end = if anew { known } else { (known + self.grid.depth.max(STRETCH)).min(all) };
+        self.grid.pass = Some(Pass {
+            end,
+            next: end - 1,
+            known: if anew { 0 } else { known },
+            depth: 0,
+            settled: if anew { f64::NEG_INFINITY } else { self.grid.settled },
+            overrides,
+        });
+        true
     }
 
-    /// The backward pass, from a stop at the last of `end` nodes to where nothing changes any more; `known` nodes were
-    /// planned before.
-    fn pass(&mut self, known: usize, end: usize) {
+    /// Goes on with the pass for at most `budget` nodes; returns what is left of them.
+    fn continue_pass(&mut self, mut budget: usize) -> usize {
         let rows = self.limits.rows();
-        let (feed, rapid) = self.executor.overrides();
-        let mut next = end.wrapping_sub(1);
-        if let Some(last) = self.nodes.get_mut(next) {
-            last.entry = 0.0;
-        }
-        self.grid.planned = end;
-        self.grid.depth = 0;
-        while next > 1 {
-            let i = next - 1;
-            let (Some(node), Some(after)) = (self.nodes.get(i), self.nodes.get(next)) else { return };
+        let Some(mut pass) = self.grid.pass.take() else { return budget };
+        let (feed, rapid) = pass.overrides;
+        while pass.next > 1 {
+            if budget == 0 {
+                self.grid.pass = Some(pass);
+                return 0;
+            }
+            let i = pass.next - 1;
+            let (Some(node), Some(after)) = (self.nodes.get(i), self.nodes.get(pass.next)) else { break };
             let cap = node.cap(feed, rapid).min(FASTEST);
             let entry = if cap > 0.0 {
                 fastest_entry(&node.right, &after.left, rows, node.length, cap, after.entry)
             } else {
                 0.0
             };
+            budget -= 1;
             self.work.planned += 1;
-            self.grid.depth += usize::from(next < known);
-            let Some(node) = self.nodes.get_mut(i) else { return };
-            let same = entry == node.entry && next < known;
+            let known = pass.next < pass.known;
+            pass.depth += usize::from(known);
+            let Some(node) = self.nodes.get_mut(i) else { break };
+            let same = known && entry == node.entry;
             node.entry = entry;
             // At its cap a node asks nothing of what follows; and one that a longer queue leaves as it is, no longer
             // queue will change (the entry is a concave function of the next one).
-            if (same || entry >= cap) && node.distance > self.grid.settled {
-                self.grid.settled = node.distance;
+            if (same || entry >= cap) && node.distance > pass.settled {
+                pass.settled = node.distance;
             }
             if same {
-                return;
+                break;
             }
-            next = i;
+            pass.next = i;
         }
+        if self.grid.overrides != pass.overrides {
+            // The interval being driven was planned with the old ones.
+            self.grid.overrides = pass.overrides;
+            self.executor.replan();
+        }
+        self.grid.planned = pass.end;
+        self.grid.depth = pass.depth;
+        self.grid.settled = pass.settled;
+        budget
     }
 }
 

@@ -4,7 +4,7 @@
 //! it), or when the machine would have to brake for lack of it.
 
 use crate::executor::Executor;
-use crate::grid::{Grid, Node};
+use crate::grid::{Grid, Node, SET_PER_PUSH};
 use crate::limits::{Feed, Limits};
 use crate::path::{Blend, FeedGroup, Geometry, Tolerance, Vector, combine};
 use crate::{PlanError, PlanErrorKind, path};
@@ -220,9 +220,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.fault.as_ref()
     }
 
-    /// True when a move can be pushed.
+    /// True when a move can be pushed: there is room for it and for the nodes that a push may set.
     pub fn has_room(&self) -> bool {
-        self.pieces.len() + 2 <= PIECES
+        self.pieces.len() + 2 <= PIECES && self.nodes.len() + SET_PER_PUSH.min(NODES / 4) <= NODES
     }
 
     /// Appends a move. Moves of no length are taken and dropped. Returns the move's number.
@@ -262,9 +262,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             motion,
             span: next.span,
         });
-        if self.is_short() {
-            self.refill().map_err(PushError::Plan)?;
-        }
+        self.extend(SET_PER_PUSH, 0).map_err(PushError::Plan)?;
         Ok(motion)
     }
 
@@ -292,7 +290,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             span,
         });
         // With nothing before it, it must count as something to do at once.
-        self.refill().map_err(PushError::Plan)
+        self.extend(SET_PER_PUSH, 0).map_err(PushError::Plan)
     }
 
     /// Nothing follows for now: the last move is released to its end, where the machine comes to rest.
