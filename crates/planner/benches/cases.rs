@@ -15,7 +15,7 @@ use catalogue::{Known, all, flower_on_moma};
 use harness::{Disturbance, Sampling, drive, limits, start, to_move, with_stack};
 use pkm_kins::Kinematics;
 use pkm_kins::machine::Mechanism;
-use pkm_planner::{Planner, Settings, State, Work};
+use pkm_planner::{Move, Planner, Settings, State, Work};
 use std::time::Instant;
 
 /// The queues of `pkm run`; as many rows as the case has joints.
@@ -140,13 +140,13 @@ fn planner<const R: usize>(known: &Known) -> Box<Bench<R>> {
 }
 
 /// Pushes while there is room. True when all is pushed.
-fn feed<const R: usize>(planner: &mut Bench<R>, known: &Known, next: &mut usize) -> bool {
-    while let Some(&piece) = known.case.moves.get(*next) {
-        if planner.push(to_move(&known.case, piece)).is_err() {
+fn feed<const R: usize>(planner: &mut Bench<R>, moves: &[Move], next: &mut usize) -> bool {
+    while let Some(&piece) = moves.get(*next) {
+        if planner.push(piece).is_err() {
             return false;
         }
         *next += 1;
-        if *next == known.case.moves.len() {
+        if *next == moves.len() {
             planner.finish();
         }
     }
@@ -154,13 +154,14 @@ fn feed<const R: usize>(planner: &mut Bench<R>, known: &Known, next: &mut usize)
 }
 
 fn run<const R: usize>(known: &Known, clock_ns: f64) -> Run {
+    let moves: Vec<Move> = known.case.moves.iter().map(|&piece| to_move(&known.case, piece)).collect();
     let since = |begin: Instant| begin.elapsed().as_nanos() as f64 - clock_ns;
     let mut driven = planner::<R>(known);
     let (mut next, mut ticks) = (0, Vec::new());
     loop {
         let before = driven.work();
         let begin = Instant::now();
-        let fed = feed(&mut driven, known, &mut next);
+        let fed = feed(&mut driven, &moves, &mut next);
         let push_ns = since(begin);
         let begin = Instant::now();
         let setpoint = driven.tick().expect("a path that can be run");
@@ -183,7 +184,7 @@ fn run<const R: usize>(known: &Known, clock_ns: f64) -> Run {
     let begin = Instant::now();
     loop {
         let before = held.work().nodes;
-        feed(&mut held, known, &mut next);
+        feed(&mut held, &moves, &mut next);
         let _ = std::hint::black_box(held.tick());
         empties += 1;
         empty = if held.work().nodes == before { empty + 1 } else { 0 };
@@ -275,7 +276,9 @@ fn cost(cases: &[Known], plain: bool) {
         // Ticks between two nodes plan nothing; where there are none, a tick at rest has to serve.
         let between: Vec<f64> =
             (0..first.len()).filter(|&k| first[k].work == Work::default()).map(|k| tick_ns[k]).collect();
-        let base_ns = if between.len() > 10 { median(between) } else { setpoint_ns };
+        // Their mean: the clock counts in steps of some 10 ns.
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let base_ns = if between.len() > 10 { mean(&between) } else { setpoint_ns };
         let all_ns = tick_ns.iter().chain(&push_ns).sum::<f64>() - base_ns * first.len() as f64;
         let grid_ns = of_runs(&|run| run.grid_ns);
         let look_ahead_ns = of_runs(&|run| run.look_ahead_ns);

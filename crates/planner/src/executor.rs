@@ -3,8 +3,9 @@
 //! what is permitted; the strips hold in every one of them, on the path.
 
 use crate::PlanError;
+use crate::grid::Node;
 use crate::interval::{accelerations, exits};
-use crate::limits::Rows;
+use crate::limits::{Rows, Sample};
 use crate::planner::{Planner, Setpoint, State};
 use pkm_kins::{Kinematics, Pose, maths::sqrt};
 
@@ -242,8 +243,23 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 self.executor.x = 0.0;
                 return true;
             }
-            if !self.executor.planned && !self.plan_leg(held) {
-                return true;
+            if !self.executor.planned {
+                if !held && let Some(x_end) = self.brief_exit() {
+                    let duration = 2.0 * length / (sqrt(self.executor.x) + sqrt(x_end));
+                    if duration <= remaining {
+                        remaining -= duration;
+                        self.executor.x = x_end;
+                        self.pass_node();
+                        if self.nodes.front().is_some_and(|node| node.stop) {
+                            self.executor.x = 0.0;
+                            return true;
+                        }
+                        continue;
+                    }
+                }
+                if !self.plan_leg(held) {
+                    return true;
+                }
             }
             let e = &mut self.executor;
             let Some(&leg) = e.legs.first() else { return true };
@@ -301,10 +317,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let (Some(node), Some(next)) = (self.nodes.front(), self.nodes.get(1)) else { return false };
         let (sigma, x) = (self.executor.sigma, self.executor.x);
         let length = node.length - sigma;
-        let anew = self
-            .piece(node.piece)
-            .filter(|_| sigma > 0.0)
-            .and_then(|piece| self.limits.sample(&self.kinematics, piece, node.s + sigma).ok());
+        let anew = self.piece(node.piece).filter(|_| sigma > 0.0).and_then(|piece| {
+            let mut sample = Sample::EMPTY;
+            self.limits.sample(&self.kinematics, piece, node.s + sigma, &mut sample).ok().map(|()| sample)
+        });
         let here = anew.as_ref().map_or(&node.right, |sample| &sample.rows);
         let (feed, rapid) = self.executor.overrides();
         // What is being driven, if it leads to the node (a braking leg may end before).
@@ -327,7 +343,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             // From the middle of an interval the strips, taken there anew, may exclude by a hair what is being driven;
             // that stays admissible.
             let (low, high) = running.map_or((low, high), |running| (low.min(running), high.max(running)));
-            let entry = (next.entry * self.grid.share(1, (feed, rapid))).min(next.cap(feed, rapid));
+            let entry = self.permitted(1, next);
             let x_end = if low <= high { entry.clamp(low, high) } else { 0.5 * (low + high) };
             if x == 0.0 && self.nodes.len() == 2 && self.pieces.back().is_some_and(|last| last.open) {
                 // At rest with one interval known and more to come.
@@ -337,8 +353,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             let cap = node.speed_cap(feed, rapid).min(next.speed_cap(feed, rapid));
             // A peak in between gains something only where the exit is held down by what follows, not by the strips,
             // and where the interval takes more than a quarter of a period.
-            let quarter = 0.25 * self.settings.servo_period_s;
-            let brief = length * length <= x.min(x_end) * quarter * quarter;
+            let brief = self.is_brief(length, x.min(x_end));
             let edge = 1e-3 * (high - low);
             let free = (low <= 0.0 || x_end - low > edge) && high - x_end > edge && cap > x.min(x_end);
             let shape =
@@ -362,6 +377,31 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.executor.legs = legs;
         self.executor.planned = true;
         true
+    }
+
+    /// The x at which node `index` may be passed under the overrides of now.
+    fn permitted(&self, index: usize, node: &Node<R>) -> f64 {
+        let (feed, rapid) = self.executor.overrides();
+        (node.entry * self.grid.share(index, (feed, rapid))).min(node.cap(feed, rapid))
+    }
+
+    /// True if `length` takes less than a quarter of a servo period at √x.
+    fn is_brief(&self, length: f64, x: f64) -> bool {
+        let quarter = 0.25 * self.settings.servo_period_s;
+        length * length <= x * quarter * quarter
+    }
+
+    /// The x at the end of the front interval, if that is brief, entered at its start and not a start from rest: one
+    /// acceleration serves it, as in [`Self::plan_leg`].
+    fn brief_exit(&self) -> Option<f64> {
+        let (node, next) = (self.nodes.front()?, self.nodes.get(1)?);
+        let x = self.executor.x;
+        if self.executor.sigma != 0.0 || !self.is_brief(node.length, x) {
+            return None;
+        }
+        let (low, high) = exits(&node.right, &next.left, self.limits.rows(), node.length, x);
+        let x_end = if low <= high { self.permitted(1, next).clamp(low, high) } else { 0.5 * (low + high) };
+        self.is_brief(node.length, x_end).then_some(x_end)
     }
 
     fn publish(&mut self, state: State) -> Result<Setpoint, PlanError> {

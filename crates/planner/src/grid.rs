@@ -71,7 +71,9 @@ pub(crate) struct Grid<const R: usize> {
     pub(crate) piece: u64,
     pub(crate) s: f64,
     step: f64,
-    last: Option<Sample<R>>,
+    /// At the last node; at the place that may become the next.
+    last: Sample<R>,
+    next: Sample<R>,
     /// Nodes from the front on that the look-ahead has planned; the last of them as a stop.
     pub(crate) planned: usize,
     /// How many of them the last pass had to plan again.
@@ -105,7 +107,8 @@ impl<const R: usize> Grid<R> {
             piece: 0,
             s: 0.0,
             step: f64::INFINITY,
-            last: None,
+            last: Sample::EMPTY,
+            next: Sample::EMPTY,
             planned: 0,
             depth: 0,
             settled: f64::NEG_INFINITY,
@@ -181,8 +184,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     }
 
     fn first_node(&mut self) -> Result<(), PlanError> {
-        let Some(piece) = self.piece(self.grid.piece) else { return Ok(()) };
-        let sample = self.limits.sample(&self.kinematics, piece, piece.from)?;
+        let index = self.grid.piece.wrapping_sub(self.first_piece) as usize;
+        let Some(piece) = self.pieces.get(index) else { return Ok(()) };
+        self.limits.sample(&self.kinematics, piece, piece.from, &mut self.grid.last)?;
+        let sample = &self.grid.last;
         let node = Node {
             piece: self.grid.piece,
             s: piece.from,
@@ -199,7 +204,6 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         };
         self.grid.s = node.s;
         self.grid.step = f64::INFINITY;
-        self.grid.last = Some(sample);
         self.work.samples += 1;
         self.add(node);
         Ok(())
@@ -215,21 +219,24 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn next_piece(&mut self) -> Result<bool, PlanError> {
         let number = self.grid.piece + 1;
         let stop = self.piece(self.grid.piece).is_some_and(|ended| ended.stop);
-        let Some(next) = self.piece(number) else { return Ok(false) };
+        let index = number.wrapping_sub(self.first_piece) as usize;
+        let Some(next) = self.pieces.get(index) else { return Ok(false) };
         let (from, rapid, dwell_ns) = (next.from, next.rapid, next.dwell_ns);
         let still = matches!(next.geometry, Geometry::Hold(_));
-        let sample = if still { None } else { Some(self.limits.sample(&self.kinematics, next, from)?) };
+        if !still {
+            self.limits.sample(&self.kinematics, next, from, &mut self.grid.last)?;
+        }
         let Some(tail) = self.nodes.back_mut() else { return Ok(false) };
         tail.stop |= stop || still;
         tail.dwell_ns += dwell_ns;
-        if let Some(sample) = sample {
+        if !still {
+            let sample = &self.grid.last;
             tail.right = sample.rows;
             tail.piece = number;
             tail.s = from;
             tail.hard = tail.hard.min(sample.hard);
             tail.feed = tail.feed.min(sample.feed);
             tail.rapid |= rapid;
-            self.grid.last = Some(sample);
             self.work.samples += 1;
         }
         self.grid.piece = number;
@@ -240,16 +247,18 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     /// One interval further along a piece.
     fn march(&mut self) -> Result<(), PlanError> {
         let index = self.grid.piece.wrapping_sub(self.first_piece) as usize;
-        let (Some(piece), Some(last)) = (self.pieces.get(index), &self.grid.last) else { return Ok(()) };
+        let Some(piece) = self.pieces.get(index) else { return Ok(()) };
+        let rows = self.limits.rows();
         let remaining = piece.to - self.grid.s;
         self.work.samples += 1;
         let guess = self.grid.step;
         let mut step = even(remaining, guess);
         let period = self.settings.servo_period_s;
-        let mut sample = self.limits.sample(&self.kinematics, piece, self.grid.s + step)?;
+        let (last, sample) = (&self.grid.last, &mut self.grid.next);
+        self.limits.sample(&self.kinematics, piece, self.grid.s + step, sample)?;
         let mut next_guess = guess;
         for _ in 0..60 {
-            let scales = last.variation(&sample);
+            let scales = last.variation(sample, rows);
             let shortest = period * sqrt(scales.speed) / NODES_PER_PERIOD;
             if step <= shortest || scales.change <= CHANGE {
                 // What would have been right here is right for the next, or nearly so.
@@ -268,10 +277,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             }
             step = shorter;
             self.work.samples += 1;
-            sample = self.limits.sample(&self.kinematics, piece, self.grid.s + step)?;
+            self.limits.sample(&self.kinematics, piece, self.grid.s + step, sample)?;
         }
         let at_end = step >= remaining;
-        let between = self.limits.between(last, &sample, step, piece, self.grid.s)?;
+        let between = self.limits.between(last, sample, step, piece, self.grid.s)?;
         let s = if at_end { piece.to } else { self.grid.s + step };
         let number = self.grid.piece;
         let Some(tail) = self.nodes.back_mut() else { return Ok(()) };
@@ -302,7 +311,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.add(node);
         self.grid.s = s;
         self.grid.step = next_guess;
-        self.grid.last = Some(sample);
+        self.grid.last = self.grid.next;
         Ok(())
     }
 
@@ -324,7 +333,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         }
         let soon = self.nodes.get(2 * NODES_PER_TICK).or(self.nodes.back());
         let settled = soon.is_none_or(|node| self.grid.settled >= node.distance);
-        if !anew && (known >= all || settled) {
+        // A pass over fewer new nodes than it plans anew is worth it only when no more come.
+        let early = all - known < self.grid.depth.min(STRETCH) && self.grows();
+        if !anew && (known >= all || settled || early) {
             return false;
         }
         // Each pass takes in as much more as the last one had to plan again: all in all no more than about three times
@@ -339,6 +350,14 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             overrides,
         });
         true
+    }
+
+    /// True if there is more path to be cut into nodes.
+    fn grows(&self) -> bool {
+        let last = self.first_piece + self.pieces.len() as u64;
+        self.fault.is_none()
+            && self.nodes.len() < NODES
+            && (self.grid.piece + 1 < last || self.piece(self.grid.piece).is_some_and(|p| self.grid.s < p.to))
     }
 
     /// Goes on with the pass for at most `budget` nodes; returns what is left of them.

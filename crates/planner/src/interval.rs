@@ -38,32 +38,46 @@ pub(crate) fn fastest_entry<const R: usize>(
 ) -> f64 {
     let h = 2.0 * length;
     let mut x = cap;
-    // Every step leaves at least one of the 4·rows + 2 borders behind for good.
-    for _ in 0..4 * R + 2 {
-        // As a rule the highest x′ asked for is the one.
+    // As a rule the highest x′ asked for is the one.
+    let reached = |x: f64| {
         let mut widest = 0.0_f64;
         borders(left, right, rows, h, |a, b| widest = widest.max((a * x + b * next_cap).abs()));
-        if widest <= h * (1.0 + 1e-12) {
-            return x;
+        widest <= h * (1.0 + 1e-12)
+    };
+    if reached(x) {
+        return x;
+    }
+    // The borders as lines x′ = slope·x ± half. One that is all but upright does not care for x′: as a line it would be
+    // the difference of two huge numbers.
+    const UPRIGHT: f64 = 1e-9;
+    let mut upright = f64::INFINITY;
+    let mut lines = [[(0.0, f64::INFINITY); 2]; R];
+    for (row, slot) in lines.iter_mut().enumerate().take(rows) {
+        let (p, q) = (left.first[row], left.second[row]);
+        let (p_end, q_end) = (right.first[row], right.second[row]);
+        for (slot, (a, b)) in slot.iter_mut().zip([(h * q - p, p), (-p_end, p_end + h * q_end)]) {
+            if b.abs() * next_cap <= UPRIGHT * h {
+                upright = upright.min(h / a.abs());
+            } else {
+                let part = 1.0 / b;
+                *slot = (-a * part, h * part.abs());
+            }
         }
+    }
+    // Every step leaves at least one of the 4·rows + 2 borders behind for good.
+    for _ in 0..4 * R + 2 {
         // Highest and lowest x′ at x, and where the same borders are at 0.
         let (mut low, mut high) = (0.0, next_cap);
         let (mut low_at_0, mut high_at_0) = (0.0, next_cap);
-        let mut upright = f64::INFINITY;
-        borders(left, right, rows, h, |a, b| {
-            if b == 0.0 {
-                upright = upright.min(h / a.abs());
-                return;
-            }
-            let part = 1.0 / b;
-            let (middle, half) = (-a * x * part, h * part.abs());
+        for &(slope, half) in lines.iter().take(rows).flatten() {
+            let middle = slope * x;
             if middle - half > low {
                 (low, low_at_0) = (middle - half, -half);
             }
             if middle + half < high {
                 (high, high_at_0) = (middle + half, half);
             }
-        });
+        }
         // The gap between the two is open at 0 and, where it is closed at x, closes in between.
         let (gap, gap_at_0) = (high - low, high_at_0 - low_at_0);
         let next = if gap >= 0.0 { x } else { x * (gap_at_0 / (gap_at_0 - gap)) }.min(upright);
@@ -72,6 +86,9 @@ pub(crate) fn fastest_entry<const R: usize>(
             return x.min(next);
         }
         x = next.max(0.0);
+        if reached(x) {
+            return x;
+        }
     }
     x
 }
@@ -128,6 +145,23 @@ pub(crate) fn accelerations<const R: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A joint whose q′ is all rounding (−7e-21) where another one decides: met on a path of half circles of 0.5 µm.
+    #[test]
+    fn an_all_but_upright_border_hides_no_other() {
+        let left = Rows {
+            first: [-7.26673310003658e-21, 0.0033350008337502076],
+            second: [-2.1466087112274015, -3.344462417456647],
+        };
+        let right = Rows {
+            first: [-9.747767652901864e-5, 0.0031785939589947074],
+            second: [-2.0409939413685905, -3.3747154182543015],
+        };
+        let (length, next_cap) = (4.6555360962239324e-5, 0.2804407824314615);
+        let x = fastest_entry(&left, &right, 2, length, 1588.0, next_cap);
+        let (low, high) = exits(&left, &right, 2, length, x);
+        assert!(low <= next_cap * (1.0 + 1e-9) && low <= high, "from {x}: {low} to {high}");
+    }
 
     fn next(state: &mut u64) -> f64 {
         *state ^= *state << 13;

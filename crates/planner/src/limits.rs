@@ -45,6 +45,12 @@ pub struct AxisLimits {
 pub struct Limits<const R: usize> {
     joints: heapless::Vec<JointLimits, MAX_JOINTS>,
     axes: heapless::Vec<AxisLimits, 9>,
+    /// 1 / (limit · [`GUARD`]) of velocity and acceleration, row by row.
+    per_velocity: [f64; R],
+    per_acceleration: [f64; R],
+    /// Travel, row by row; infinite where there is none.
+    lowest: [f64; R],
+    highest: [f64; R],
     /// A pose nearer to a singularity than this (either measure) is refused.
     pub singularity_guard: f64,
 }
@@ -96,7 +102,26 @@ impl<const R: usize> Limits<R> {
                 return Err(LimitsError::Axis(limit.axis));
             }
         }
+        let velocities = joints.iter().map(|l| l.max_velocity).chain(axes.iter().map(|l| l.max_velocity));
+        let accelerations =
+            joints.iter().map(|l| l.max_acceleration).chain(axes.iter().map(|l| l.max_acceleration));
+        let none = JointRange { min: f64::NEG_INFINITY, max: f64::INFINITY };
+        let ranges = joints.iter().map(|l| l.range).chain(axes.iter().map(|l| l.range.unwrap_or(none)));
+        let (mut per_velocity, mut per_acceleration) = ([0.0; R], [0.0; R]);
+        let (mut lowest, mut highest) = ([f64::NEG_INFINITY; R], [f64::INFINITY; R]);
+        for (row, ((velocity, acceleration), range)) in
+            velocities.zip(accelerations).zip(ranges).enumerate().take(R)
+        {
+            per_velocity[row] = 1.0 / (velocity * GUARD);
+            per_acceleration[row] = 1.0 / (acceleration * GUARD);
+            lowest[row] = range.min - JointRange::TOLERANCE;
+            highest[row] = range.max + JointRange::TOLERANCE;
+        }
         Ok(Self {
+            per_velocity,
+            per_acceleration,
+            lowest,
+            highest,
             joints: heapless::Vec::from_slice(joints).map_err(|_| too_many)?,
             axes: heapless::Vec::from_slice(axes).map_err(|_| too_many)?,
             singularity_guard,
@@ -106,6 +131,14 @@ impl<const R: usize> Limits<R> {
     /// Number of rows in use.
     pub(crate) fn rows(&self) -> usize {
         self.joints.len() + self.axes.len()
+    }
+
+    /// The travel of a row.
+    fn range(&self, row: usize) -> Option<JointRange> {
+        match self.joints.get(row) {
+            Some(limits) => Some(limits.range),
+            None => self.axes.get(row - self.joints.len()).and_then(|limits| limits.range),
+        }
     }
 
     /// Checks a pose and its joints against travel.
@@ -126,69 +159,60 @@ impl<const R: usize> Limits<R> {
         Ok(())
     }
 
-    /// The strips and caps at one point of a piece.
+    /// The strips and caps at one point of a piece, into `sample`.
     ///
     /// # Errors
     /// The point is out of reach, out of travel or too near a singularity.
+    #[inline]
     pub(crate) fn sample<K: Kinematics>(
         &self,
         kinematics: &K,
         piece: &Piece,
         s: f64,
-    ) -> Result<Sample<R>, PlanError> {
+        sample: &mut Sample<R>,
+    ) -> Result<(), PlanError> {
         let point = piece.geometry.at(s);
         let pose = Pose::from_array(point.position);
         let fail = |kind| PlanError { kind, span: piece.span, pose };
         let motion = kinematics
             .motion(&pose, &Pose::from_array(point.first), &Pose::from_array(point.second))
             .map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
-        self.check_travel(&pose, &motion.position).map_err(fail)?;
         if self.singularity_guard > 0.0 {
+            self.check_travel(&pose, &motion.position).map_err(fail)?;
             let measure = kinematics.singularity(&pose).map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
             let nearest = measure.inverse.min(measure.forward);
             if !(nearest >= self.singularity_guard) {
                 return Err(fail(PlanErrorKind::Unreachable(InverseError::Singular { measure: nearest })));
             }
         }
-        let mut sample = Sample {
-            rows: Rows { first: [0.0; R], second: [0.0; R] },
-            speed: [0.0; R],
-            position: [0.0; R],
-            hard: FASTEST,
-            feed: piece.feed.cap(&point.first),
-        };
-        let joint_rows =
-            self.joints.iter().zip(&motion.position).zip(motion.velocity.iter().zip(&motion.acceleration));
-        let joint_rows =
-            joint_rows.map(|((l, q), (d1, d2))| (l.max_velocity, l.max_acceleration, *q, *d1, *d2));
-        let axis_rows = self.axes.iter().map(|limits| {
+        sample.feed = piece.feed.cap(&point.first);
+        let joints = motion.position.iter().zip(&motion.velocity).zip(&motion.acceleration);
+        let joints = joints.take(self.joints.len()).map(|((q, d1), d2)| (*q, *d1, *d2));
+        let axes = self.axes.iter().map(|limits| {
             let k = limits.axis as usize;
             let at = |v: &[f64; 9]| v.get(k).copied().unwrap_or(0.0);
-            (
-                limits.max_velocity,
-                limits.max_acceleration,
-                at(&point.position),
-                at(&point.first),
-                at(&point.second),
-            )
+            (at(&point.position), at(&point.first), at(&point.second))
         });
-        let slots = sample
-            .rows
-            .first
-            .iter_mut()
-            .zip(&mut sample.rows.second)
-            .zip(&mut sample.speed)
-            .zip(&mut sample.position);
-        for ((((first, second), speed), position), (v_max, a_max, q, d1, d2)) in
-            slots.zip(joint_rows.chain(axis_rows))
-        {
-            *first = d1 / (a_max * GUARD);
-            *second = d2 / (a_max * GUARD);
-            *speed = d1 / (v_max * GUARD);
-            *position = q;
-            sample.hard = sample.hard.min(speed_cap(*speed));
+        let (mut fastest, mut within) = (0.0_f64, true);
+        let mut set = |row: usize, (q, d1, d2): (f64, f64, f64)| {
+            if row < R {
+                let speed = d1 * self.per_velocity[row];
+                sample.rows.first[row] = d1 * self.per_acceleration[row];
+                sample.rows.second[row] = d2 * self.per_acceleration[row];
+                sample.speed[row] = speed;
+                sample.position[row] = q;
+                fastest = fastest.max(speed.abs());
+                within &= q >= self.lowest[row] && q <= self.highest[row];
+            }
+        };
+        for (row, values) in joints.enumerate() {
+            set(row, values);
         }
-        Ok(sample)
+        for (row, values) in axes.enumerate() {
+            set(self.joints.len() + row, values);
+        }
+        sample.hard = speed_cap(fastest);
+        if within { Ok(()) } else { self.check_travel(&pose, &motion.position).map_err(fail) }
     }
 }
 
@@ -207,24 +231,23 @@ impl<const R: usize> Limits<R> {
         s: f64,
     ) -> Result<f64, PlanError> {
         let mut cap = a.hard.min(b.hard);
-        let joints = self.joints.iter().map(|l| (l.max_velocity, l.max_acceleration, Some(l.range)));
-        let axes = self.axes.iter().map(|l| (l.max_velocity, l.max_acceleration, l.range));
-        for (row, (v_max, a_max, range)) in joints.chain(axes).enumerate() {
-            let at = |v: &[f64; R]| v.get(row).copied().unwrap_or(0.0);
-            let (speed_a, speed_b) = (at(&a.speed), at(&b.speed));
-            let (bend_a, bend_b) = (at(&a.rows.second), at(&b.rows.second));
-            if bend_a * bend_b < 0.0 && a_max.is_finite() && v_max.is_finite() {
+        for row in 0..self.rows().min(R) {
+            let (speed_a, speed_b) = (a.speed[row], b.speed[row]);
+            let (bend_a, bend_b) = (a.rows.second[row], b.rows.second[row]);
+            if bend_a * bend_b < 0.0 {
                 // q″ changes sign: q′ has an extremum, about a triangle's area away from either end.
                 let to_peak = length * bend_a.abs() / (bend_a.abs() + bend_b.abs());
-                let extra = 0.5 * bend_a.abs() * a_max / v_max * to_peak;
-                cap = cap.min(speed_cap(speed_a.abs().max(speed_b.abs()) + extra));
+                let extra =
+                    0.5 * bend_a.abs() * self.per_velocity[row] / self.per_acceleration[row] * to_peak;
+                if extra.is_finite() {
+                    cap = cap.min(speed_cap(speed_a.abs().max(speed_b.abs()) + extra));
+                }
             }
-            if let Some(range) = range
-                && speed_a * speed_b < 0.0
-                && v_max.is_finite()
+            if speed_a * speed_b < 0.0
+                && let Some(range) = self.range(row)
             {
                 let to_turn = length * speed_a.abs() / (speed_a.abs() + speed_b.abs());
-                let value = at(&a.position) + 0.5 * speed_a * v_max * GUARD * to_turn;
+                let value = a.position[row] + 0.5 * speed_a / self.per_velocity[row] * to_turn;
                 if !range.contains(value) {
                     let kind = match self.axes.get(row.wrapping_sub(self.joints.len())) {
                         Some(limits) => PlanErrorKind::AxisTravel { axis: limits.axis, value, range },
@@ -261,6 +284,9 @@ impl Feed {
     }
 
     fn cap(&self, first: &[f64; 9]) -> f64 {
+        if self.speed == f64::INFINITY {
+            return f64::INFINITY;
+        }
         let length = feed_length(first, self.group);
         if length > 0.0 { (self.speed / length) * (self.speed / length) } else { f64::INFINITY }
     }
@@ -287,15 +313,23 @@ pub(crate) struct Sample<const R: usize> {
 }
 
 impl<const R: usize> Sample<R> {
+    pub(crate) const EMPTY: Self = Self {
+        rows: Rows { first: [0.0; R], second: [0.0; R] },
+        speed: [0.0; R],
+        position: [0.0; R],
+        hard: FASTEST,
+        feed: f64::INFINITY,
+    };
+
     /// How much the strips change between two points, in shares of the limits: the measure that spaces the nodes.
     /// Also returns x̂, the scale of speed there.
-    pub(crate) fn variation(&self, other: &Self) -> Scales {
+    pub(crate) fn variation(&self, other: &Self, rows: usize) -> Scales {
         let mut steepest = 0.0_f64;
         let mut bend = 0.0_f64;
-        for (a, b) in self.rows.first.iter().zip(&other.rows.first) {
+        for (a, b) in self.rows.first.iter().zip(&other.rows.first).take(rows) {
             steepest = steepest.max(a.abs()).max(b.abs());
         }
-        for (a, b) in self.rows.second.iter().zip(&other.rows.second) {
+        for (a, b) in self.rows.second.iter().zip(&other.rows.second).take(rows) {
             bend = bend.max(a.abs()).max(b.abs());
         }
         let by_bend = if bend * FASTEST > 2.0 { 2.0 / bend } else { FASTEST };
@@ -304,7 +338,7 @@ impl<const R: usize> Sample<R> {
         let mut change = 0.0_f64;
         let firsts = self.rows.first.iter().zip(&other.rows.first);
         let seconds = self.rows.second.iter().zip(&other.rows.second);
-        for ((a1, b1), (a2, b2)) in firsts.zip(seconds) {
+        for ((a1, b1), (a2, b2)) in firsts.zip(seconds).take(rows) {
             change = change.max((b1 - a1).abs() * acceleration + (b2 - a2).abs() * speed);
         }
         Scales { change, speed }

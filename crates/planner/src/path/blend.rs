@@ -88,16 +88,16 @@ impl Blend {
 
     pub(super) fn at(&self, s: f64) -> Point {
         let [c0, c1, c2, c3] = &self.coefficients;
-        let (w, k) = (s / self.length, 1.0 / self.length);
-        let poly = |a: &Vector, b: &Vector, f: fn(f64, f64, f64) -> f64| combine(a, b, |x, y| f(x, y, w));
-        let high = poly(c2, c3, |x, y, w| (x + y * w) * w * w);
-        let low = poly(c0, c1, |x, y, w| x + y * w);
-        let first = combine(c1, &poly(c2, c3, |x, y, w| (2.0 * x + 3.0 * y * w) * w), |a, b| (a + b) * k);
-        Point {
-            position: combine(&low, &high, |a, b| a + b),
-            first,
-            second: poly(c2, c3, |x, y, w| 2.0 * x + 6.0 * y * w).map(|x| x * k * k),
+        let k = 1.0 / self.length;
+        let w = s * k;
+        let mut point = Point { position: [0.0; 9], first: [0.0; 9], second: [0.0; 9] };
+        for i in 0..9 {
+            let (c2, c3) = (c2[i], c3[i]);
+            point.position[i] = c0[i] + (c1[i] + (c2 + c3 * w) * w) * w;
+            point.first[i] = (c1[i] + (2.0 * c2 + 3.0 * c3 * w) * w) * k;
+            point.second[i] = (2.0 * c2 + 6.0 * c3 * w) * k * k;
         }
+        point
     }
 }
 

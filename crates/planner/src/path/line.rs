@@ -30,10 +30,10 @@ impl Line {
     }
 
     pub(super) fn at(&self, s: f64) -> Point {
-        Point {
-            position: combine(&self.start, &self.direction, |x, d| x + d * s),
-            first: self.direction,
-            second: [0.0; 9],
+        let mut position = self.start;
+        for (x, d) in position.iter_mut().zip(&self.direction) {
+            *x += d * s;
         }
+        Point { position, first: self.direction, second: [0.0; 9] }
     }
 }

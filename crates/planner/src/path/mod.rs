@@ -107,8 +107,9 @@ pub fn feed_group(displacement: &Vector) -> FeedGroup {
 }
 
 pub(crate) fn combine(a: &Vector, b: &Vector, f: impl Fn(f64, f64) -> f64) -> Vector {
-    core::array::from_fn(|i| match (a.get(i), b.get(i)) {
-        (Some(&a), Some(&b)) => f(a, b),
-        _ => 0.0,
-    })
+    let mut out = *a;
+    for (x, y) in out.iter_mut().zip(b) {
+        *x = f(*x, *y);
+    }
+    out
 }
