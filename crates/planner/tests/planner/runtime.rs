@@ -170,3 +170,39 @@ fn an_override_that_is_no_number_changes_nothing() {
         assert_eq!(rig.ticks, ticks);
     });
 }
+
+/// The bounds of docs/planner.md: nodes set and planned by a push and by a tick, whatever the queue holds and whoever
+/// turns the override.
+#[test]
+fn the_work_of_a_push_and_of_a_tick_is_bounded() {
+    with_stack(|| {
+        let case = flower_on_moma(10_000);
+        let mut rig = Rig::new(&case, Sampling::SERVO);
+        let mut seed = 0x3c6e_f372_fe94_f82b;
+        let (mut passed_before, mut most_passed) = (0, 0);
+        loop {
+            let mut work = rig.planner.work();
+            while !rig.is_fed() && rig.planner.has_room() {
+                rig.feed(true);
+                let now = rig.planner.work();
+                assert!(now.nodes - work.nodes <= 64, "a push sets {}", now.nodes - work.nodes);
+                assert!(now.planned - work.planned <= 512, "a push plans {}", now.planned - work.planned);
+                work = now;
+            }
+            if random(&mut seed).is_multiple_of(40) {
+                let factor = (random(&mut seed) % 201) as f64 / 100.0;
+                assert!(rig.planner.set_feed_override(factor) && rig.planner.set_rapid_override(1.0));
+            }
+            let setpoint = rig.tick();
+            let now = rig.planner.work();
+            let (set, passed) = (now.nodes - work.nodes, now.passed - work.passed);
+            assert!(set <= 16_u64.max(2 * passed_before), "a tick sets {set} after {passed_before}");
+            assert!(now.planned - work.planned <= 2 * 64_u64.max(8 * set), "a tick plans too many");
+            (passed_before, most_passed) = (passed, most_passed.max(passed));
+            if setpoint.state == State::Idle && rig.is_fed() {
+                break;
+            }
+        }
+        assert!(most_passed <= 128, "{most_passed} nodes in a tick");
+    });
+}
