@@ -27,6 +27,7 @@
 //! ```
 #![no_std]
 
+pub mod base_thread;
 pub mod conditioner;
 pub mod drivers;
 pub mod edges;
