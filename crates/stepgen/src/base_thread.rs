@@ -68,7 +68,7 @@ impl BaseThreadStepgen {
         if servo_period_ns == 0 {
             return Err(TimingError::ServoPeriod { servo_period_ns });
         }
-        if servo_period_ns % base_period_ns != 0 {
+        if !servo_period_ns.is_multiple_of(base_period_ns) {
             return Err(TimingError::NotWhole { servo_period_ns, timer_period_ns: base_period_ns });
         }
         // A pulse has a length, and a change of direction takes a period, whatever was asked.
