@@ -1,7 +1,8 @@
 //! One number for all results of all mechanisms: FNV-1a over the bits of joints, poses, derivatives and error codes' cases,
-//! and over the edges of a step generator.
+//! over the edges of a step generator, and over those of a whole controller that runs a G-code program.
 #![no_std]
 
+pub mod controller;
 pub mod steps;
 
 use pkm_kins::maths::radians;
@@ -145,6 +146,7 @@ pub fn kinematics(count: u32) -> (u64, u32) {
     };
     add(Hexapod::new(&hexapod).ok().map(Into::into), pose(-1.0), pose(1.0));
     hash.word(steps::hash());
+    hash.word(controller::hash().0);
     (hash.0, reachable)
 }
 
