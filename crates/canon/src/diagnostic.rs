@@ -2,6 +2,7 @@
 //! Text and JSON are renderings of it (`pkm/src/render`).
 
 use alloc::string::String;
+use alloc::vec::Vec;
 
 /// How bad it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -28,6 +29,23 @@ pub struct Diagnostic {
     /// Line, counted from 1; 0 = the file as a whole.
     pub line: u32,
     /// First column, counted from 1 in bytes; 0 = the line as a whole.
+    pub column: u32,
+    /// One past the last column.
+    pub end_column: u32,
+    /// Other places that belong to it, nearest first: where the sub was called, where the loop begins.
+    pub notes: Vec<Note>,
+}
+
+/// Another place that belongs to a diagnostic.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Note {
+    /// What this place has to do with it, e.g. `called from here`.
+    pub message: String,
+    /// Path of the file.
+    pub file: String,
+    /// Line, counted from 1.
+    pub line: u32,
+    /// First column, counted from 1 in bytes.
     pub column: u32,
     /// One past the last column.
     pub end_column: u32,

@@ -1,7 +1,7 @@
 //! A block: the words of one line, read and checked but not yet executed.
 
 use crate::error::{Code, Error, ErrorKind};
-use crate::expression::{self, Reference, Scope};
+use crate::expression::{self, Reference, Scope, UNKNOWN};
 use crate::lexer::{self, Fault, Rest, fault, fault_here, into_fault};
 use crate::line::Line;
 use crate::modal::*;
@@ -221,6 +221,41 @@ impl Block {
         Ok(())
     }
 
+    /// Reads what can be read of a line that is wrong: a word at fault is passed over. `lost` gets the prepared text from
+    /// the begin of each parameter setting that cannot be read.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn salvage(
+        &mut self,
+        line: &Line,
+        start: usize,
+        scope: &impl Scope,
+        reader: &Reader,
+        mut lost: impl FnMut(&[u8]),
+    ) {
+        self.clear(line);
+        let code = line.code();
+        let mut rest = &code[start.min(code.len())..];
+        while let Some(&letter) = rest.first() {
+            if let Ok(after) = self.item(line, letter, rest, scope, reader) {
+                rest = after;
+                continue;
+            }
+            if letter == b'#' {
+                lost(rest);
+            }
+            let mut depth = 0_u32;
+            let word = |byte: &u8| {
+                match byte {
+                    b'[' => depth += 1,
+                    b']' => depth = depth.saturating_sub(1),
+                    _ => {}
+                }
+                depth == 0 && (byte.is_ascii_lowercase() || *byte == b'(')
+            };
+            rest = rest[1..].iter().position(word).map_or(&[], |at| &rest[1 + at..]);
+        }
+    }
+
     /// One word, parameter setting or comment.
     fn item<'a>(
         &mut self,
@@ -246,12 +281,18 @@ impl Block {
         match letter {
             b'g' => {
                 let (rest, value) = expression::value(after, scope)?;
+                if value.is_nan() {
+                    return Ok(rest); // only a run can tell
+                }
                 let code = g_code(value).map_err(|kind| fault(kind, input, rest))?;
                 self.add_g(line, code, input, rest)?;
                 Ok(rest)
             }
             b'm' => {
                 let (rest, number) = expression::integer(after, scope)?;
+                if number == UNKNOWN {
+                    return Ok(rest);
+                }
                 let group = reader.m_group(number);
                 let group = group.ok_or_else(|| fault(ErrorKind::MUnknown { number }, input, rest))?;
                 self.add_m(line, number, group, input, rest)?;
@@ -270,7 +311,7 @@ impl Block {
                 let (rest, value) = match letter {
                     b'h' | b'l' | b't' | b'$' => {
                         let (rest, value) = expression::integer(after, scope)?;
-                        (rest, value.into())
+                        (rest, if value == UNKNOWN { f64::NAN } else { value.into() })
                     }
                     _ => expression::value(after, scope)?,
                 };

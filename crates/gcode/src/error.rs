@@ -257,6 +257,7 @@ mod diagnostic {
     use alloc::{
         format,
         string::{String, ToString},
+        vec::Vec,
     };
     use pkm_canon::diagnostic::{Diagnostic, Severity};
 
@@ -279,6 +280,7 @@ mod diagnostic {
                 line: self.span.line,
                 column: self.span.start + 1,
                 end_column: self.span.end + 1,
+                notes: Vec::new(),
             }
         }
     }

@@ -14,6 +14,14 @@ pub(crate) trait Scope {
     fn tolerance(&self) -> Tolerance;
     /// Two signs in a row are an error.
     fn strict(&self) -> bool;
+    /// `EXISTS[#<name>]`.
+    fn exists(&self, name: &[u8]) -> bool {
+        self.named(name).is_some()
+    }
+    /// The text is only read, not run: NaN stands for a value that only a run can tell.
+    fn is_static(&self) -> bool {
+        false
+    }
 }
 
 /// Rules of comparison; they differ between LinuxCNC's versions.
@@ -25,6 +33,9 @@ pub(crate) struct Tolerance {
 
 /// Deepest accepted nesting of brackets and indirections (promise P5).
 pub(crate) const MAX_DEPTH: u8 = 64;
+
+/// A whole number that only a run can tell (see [`Scope::is_static`]).
+pub(crate) const UNKNOWN: i32 = i32::MIN;
 
 /// Highest parameter number.
 pub(crate) const LAST_PARAMETER: i32 = 5601;
@@ -43,11 +54,14 @@ pub(crate) fn integer<'a>(input: Rest<'a>, scope: &impl Scope) -> Read<'a, i32> 
 #[cfg(feature = "alloc")]
 pub(crate) fn bracketed<'a>(input: Rest<'a>, scope: &impl Scope) -> Read<'a, f64> {
     let (rest, result) = bracket(input, scope, 0)?;
-    finite(result, input, rest)
+    finite(result, scope, input, rest)
 }
 
 fn integer_at<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, i32> {
     let (rest, value) = signed_value(input, scope, depth)?;
+    if value.is_nan() {
+        return Ok((rest, UNKNOWN));
+    }
     let rounded = maths::floor(value + 0.5);
     if (value - rounded).abs() > 0.0001 || rounded.abs() > 2e9 {
         return Err(fault(ErrorKind::NotInteger { value }, input, rest));
@@ -76,11 +90,11 @@ fn signed_value<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, 
         [b'a'..=b'z', ..] => function(rest, scope, depth),
         _ => lexer::number(rest),
     }?;
-    finite(if negative { -value } else { value }, input, after)
+    finite(if negative { -value } else { value }, scope, input, after)
 }
 
-fn finite<'a>(value: f64, from: Rest<'a>, to: Rest<'a>) -> Read<'a, f64> {
-    if value.is_nan() {
+fn finite<'a>(value: f64, scope: &impl Scope, from: Rest<'a>, to: Rest<'a>) -> Read<'a, f64> {
+    if value.is_nan() && !scope.is_static() {
         return Err(fault(ErrorKind::MathNan, from, to));
     }
     if value.is_infinite() {
@@ -136,6 +150,9 @@ fn apply(left: f64, operator: Operator, right: f64, scope: &impl Scope) -> Resul
     let truth = |condition: bool| if condition { 1.0 } else { 0.0 };
     let Tolerance { equal, ordered } = scope.tolerance();
     let same = || (left - right).abs() < equal;
+    if scope.is_static() && (left.is_nan() || right.is_nan()) {
+        return Ok(f64::NAN);
+    }
     Ok(match operator {
         Operator::Power if left < 0.0 && maths::floor(right) != right => return Err(ErrorKind::MathPower),
         Operator::Power => maths::pow(left, right),
@@ -191,7 +208,7 @@ pub(crate) fn reference<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> R
         return Ok((rest, Reference::Name(name)));
     }
     let (rest, index) = integer_at(rest, scope, depth)?;
-    if !(1..=LAST_PARAMETER).contains(&index) {
+    if !(1..=LAST_PARAMETER).contains(&index) && index != UNKNOWN {
         return Err(fault(ErrorKind::ParamRange { value: index.into() }, input, rest));
     }
     Ok((rest, Reference::Number(index)))
@@ -218,6 +235,9 @@ fn function<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, f64>
         let (rest, second) = bracket(after, scope, depth)?;
         return Ok((rest, maths::atan2(x, second) * 180.0 / maths::PI));
     }
+    if x.is_nan() {
+        return Ok((rest, x));
+    }
     let result = call(function, x).map_err(|kind| fault(kind, input, rest))?;
     Ok((rest, result))
 }
@@ -232,7 +252,7 @@ fn exists<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, f64> {
     let (rest, ()) = byte(b']')(rest).map_err(|_| fault(ErrorKind::ExprUnclosed, input, rest))?;
     let known = match reference {
         Reference::Number(_) => true,
-        Reference::Name(name) => scope.named(name).is_some(),
+        Reference::Name(name) => scope.exists(name),
     };
     Ok((rest, if known { 1.0 } else { 0.0 }))
 }

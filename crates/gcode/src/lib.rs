@@ -28,6 +28,8 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+#[cfg(feature = "std")]
+mod advice;
 mod block;
 mod error;
 mod expression;
@@ -35,6 +37,8 @@ mod interpreter;
 mod lexer;
 mod line;
 mod modal;
+#[cfg(feature = "alloc")]
+mod o_word;
 #[cfg(feature = "alloc")]
 mod parameter_file;
 mod parameters;

@@ -149,6 +149,12 @@ impl Parameters {
         None
     }
 
+    /// The named parameters that were ever set, by whatever sub.
+    #[cfg(feature = "std")]
+    pub(crate) fn names(&self) -> impl Iterator<Item = &[u8]> {
+        self.named.names.keys().map(|name| &**name)
+    }
+
     /// Sets or creates `#<name>`.
     #[cfg(feature = "alloc")]
     pub(crate) fn set_named(&mut self, name: &[u8], value: f64) -> Result<(), ErrorKind> {

@@ -103,20 +103,23 @@ pub fn canon_text(
     tools: ToolTable,
     source: &mut dyn LineSource,
     sink: &mut dyn CanonSink,
-    report: impl FnMut(&Error, &[u8]) -> bool,
+    mut report: impl FnMut(&Error, &[u8]) -> bool,
 ) -> Interpreter {
     let mut interpreter = Interpreter::new(settings);
     *interpreter.tools_mut() = tools;
-    canon_text_of(&mut interpreter, source, sink, report);
+    canon_text_of(&mut interpreter, source, sink, |error, interpreter, _| {
+        report(error, interpreter.source_line())
+    });
     interpreter
 }
 
-/// [`canon_text`] with an interpreter that the caller has prepared (parameters, tools).
+/// [`canon_text`] with an interpreter that the caller has prepared (parameters, tools); `report` gets the interpreter
+/// and the source too, for [`Interpreter::diagnose`].
 pub fn canon_text_of(
     interpreter: &mut Interpreter,
     source: &mut dyn LineSource,
     sink: &mut dyn CanonSink,
-    mut report: impl FnMut(&Error, &[u8]) -> bool,
+    mut report: impl FnMut(&Error, &Interpreter, &dyn LineSource) -> bool,
 ) {
     let mut machine = SimulatedMachine::new(sink);
     loop {
@@ -125,7 +128,7 @@ pub fn canon_text_of(
             Ok(Status::Synch) => machine.answer(interpreter),
             Ok(Status::Ended) => break,
             Err(error) => {
-                let go_on = report(&error, interpreter.source_line());
+                let go_on = report(&error, interpreter, source);
                 if !go_on || interpreter.has_ended() {
                     break;
                 }

@@ -44,6 +44,13 @@ pub trait LineSource {
         let _ = name;
         Ok(None)
     }
+
+    /// The path of a file, for messages; `None` where the source does not know it (a program in memory).
+    #[cfg(feature = "alloc")]
+    fn file_name(&self, file: FileId) -> Option<alloc::string::String> {
+        let _ = file;
+        None
+    }
 }
 
 /// Longest accepted line in bytes, without the line end (LinuxCNC's limit is 253; promise P5 asks for a bound).
@@ -93,7 +100,8 @@ pub use file::FileSource;
 #[cfg(feature = "std")]
 mod file {
     use super::{LineSource, MAX_LINE, Place, SourceError};
-    use alloc::{format, string::String, vec::Vec};
+    use alloc::string::{String, ToString};
+    use alloc::{format, vec::Vec};
     use pkm_canon::FileId;
     use std::fs::File;
     use std::io::{self, BufRead, BufReader};
@@ -191,6 +199,10 @@ mod file {
             opened.seek(place).map_err(|_| SourceError::NotSeekable)?;
             self.current = index;
             Ok(())
+        }
+
+        fn file_name(&self, file: FileId) -> Option<String> {
+            self.path(file).map(|path| path.display().to_string())
         }
 
         fn find_subroutine(&mut self, name: &str) -> Result<Option<Place>, SourceError> {

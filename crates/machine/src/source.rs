@@ -55,6 +55,7 @@ impl Source {
             line: 0,
             column: 0,
             end_column: 0,
+            notes: Vec::new(),
         };
         let Some(span) = span else { return diagnostic };
         let (text, span) = if span.start >= self.text.len() && !self.overrides.is_empty() {

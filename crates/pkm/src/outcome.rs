@@ -50,6 +50,7 @@ impl Failure {
             line: 0,
             column: 0,
             end_column: 0,
+            notes: Vec::new(),
         }])
     }
 

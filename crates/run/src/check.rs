@@ -3,7 +3,7 @@
 //! Nothing is planned here: every programmed move is sampled closely along its whole length. All findings are
 //! reported (one a block and kind), not only the first.
 
-use crate::feeder::{Events, face, frame, interpreter};
+use crate::feeder::{Events, face, frame, inside, interpreter};
 use crate::program::Program;
 use crate::switch::switched;
 use crate::{Options, messages};
@@ -15,7 +15,7 @@ use pkm_kins::{JointRange, Joints, Kinematics, Pose};
 use pkm_machine::Machine;
 use pkm_planner::path::Geometry;
 use pkm_planner::{Event, Frame, Move, PlanError, PlanErrorKind};
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 /// Distance between samples, mm (or rad where only angles move), and the most samples a move gets.
 const SPACING: f64 = 0.25;
@@ -32,6 +32,8 @@ pub struct Checked {
     pub blocks: u64,
     /// Moves looked at.
     pub moves: u64,
+    /// What was found where: a loop or a sub that runs often says it once.
+    known: BTreeSet<(String, u32, u32, String)>,
 }
 
 impl Checked {
@@ -40,7 +42,23 @@ impl Checked {
         self.diagnostics.iter().any(|d| d.severity == Severity::Error)
     }
 
-    fn add(&mut self, program: &Program, finding: Diagnostic) {
+    /// In the order a person reads: the program's own lines, then those of its subroutine files. What is about no line
+    /// comes first; that there is more to find comes last.
+    pub(crate) fn sort(&mut self, program: &Program) {
+        let own = program.name();
+        self.diagnostics.sort_by(|a, b| {
+            let key = |d: &Diagnostic| (d.code == messages::TOO_MANY, d.file != own, d.line == 0);
+            let ((more_a, other_a, whole_a), (more_b, other_b, whole_b)) = (key(a), key(b));
+            (more_a, other_a, !whole_a, &a.file, a.line, a.column)
+                .cmp(&(more_b, other_b, !whole_b, &b.file, b.line, b.column))
+        });
+    }
+
+    pub(crate) fn add(&mut self, program: &Program, finding: Diagnostic) {
+        let key = (finding.file.clone(), finding.line, finding.column, finding.code.clone());
+        if !self.known.insert(key) {
+            return;
+        }
         match self.diagnostics.len() {
             n if n < MOST_FINDINGS => self.diagnostics.push(finding),
             MOST_FINDINGS => self.diagnostics.push(messages::too_many(program, MOST_FINDINGS)),
@@ -54,6 +72,13 @@ impl Checked {
 /// # Errors
 /// The program cannot be read.
 pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<Checked, Diagnostic> {
+    let mut checked = interpret(program, machine, options)?;
+    checked.sort(program);
+    Ok(checked)
+}
+
+/// Interprets the program and looks at every move.
+fn interpret(program: &Program, machine: &Machine, options: &Options) -> Result<Checked, Diagnostic> {
     let start = options.start.unwrap_or(machine.home);
     let mut checked = Checked::default();
     let mut mechanism = machine.mechanism;
@@ -71,50 +96,62 @@ pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<
     let mut queue = VecDeque::new();
     loop {
         let mut sink = Events { frame: &mut frame, queue: &mut queue };
-        match interpreter.step(&mut *source, &mut sink) {
-            Ok(status) => {
-                checked.blocks += 1;
-                while let Some((event, span)) = queue.pop_front() {
-                    match event {
-                        Event::Move(step) => {
-                            checked.moves += 1;
-                            check_move(program, machine, &mechanism, &step, span, &mut checked);
-                        }
-                        Event::Unsupported(what) => {
-                            checked.add(program, messages::unsupported(program, span, what));
-                        }
-                        Event::MachineCode(number) => {
-                            let code = (number, span);
-                            let switch = check_switch(
-                                program,
-                                machine,
-                                &mut mechanism,
-                                code,
-                                &mut frame,
-                                &mut checked,
-                            );
-                            if let Err(finding) = switch {
-                                checked.add(program, finding);
-                                checked.add(program, messages::not_checked_further(program, span));
-                                return Ok(checked);
-                            }
-                        }
-                        Event::Dwell { .. } | Event::Stop => {}
+        let stepped = interpreter.step(&mut *source, &mut sink);
+        if let Err(error) = &stepped {
+            let finding = interpreter.diagnose(error, &*source, &program.name());
+            checked.add(program, finding);
+            if checked.diagnostics.len() > MOST_FINDINGS || interpreter.has_ended() {
+                return Ok(checked);
+            }
+            // A block at fault moves nothing, but what it sets and where it leads holds for the blocks behind it.
+            queue.retain(|(event, _)| matches!(event, Event::MachineCode(_)));
+            let mut sink = Events { frame: &mut frame, queue: &mut queue };
+            interpreter.go_on(&mut *source, &mut sink);
+            queue.retain(|(event, _)| matches!(event, Event::MachineCode(_)));
+            if let Some((number, span)) = interpreter.lost_machine_code().filter(|_| queue.is_empty()) {
+                queue.push_back((Event::MachineCode(number), span));
+            } else {
+                frame.set_position(inside(&interpreter.machine_position_mm()));
+            }
+        }
+        let switches = matches!(queue.front(), Some((Event::MachineCode(_), _)));
+        checked.blocks += u64::from(stepped.is_ok());
+        while let Some((event, span)) = queue.pop_front() {
+            let mut findings = Vec::new();
+            let mut cannot_go_on = false;
+            match event {
+                Event::Move(step) => {
+                    checked.moves += 1;
+                    check_move(program, machine, &mechanism, &step, span, &mut findings);
+                }
+                Event::Unsupported(what) => findings.push(messages::unsupported(program, span, what)),
+                Event::MachineCode(number) => {
+                    let code = (number, span);
+                    let switch =
+                        check_switch(program, machine, &mut mechanism, code, &mut frame, &mut findings);
+                    if let Err(finding) = switch {
+                        findings.push(finding);
+                        findings.push(messages::not_checked_further(program, span));
+                        cannot_go_on = true;
                     }
                 }
-                match status {
-                    Status::Running => {}
-                    Status::Synch => interpreter.set_machine_position_mm(face(frame.position())),
-                    Status::Ended => return Ok(checked),
-                }
+                Event::Dwell { .. } | Event::Stop => {}
             }
-            Err(error) => {
-                queue.clear();
-                checked.add(program, error.to_diagnostic(&program.name(), interpreter.source_line()));
-                if interpreter.has_ended() || checked.diagnostics.len() > MOST_FINDINGS {
-                    return Ok(checked);
-                }
+            for mut finding in findings {
+                // In a sub: its own file, and the calls that led there.
+                finding.file = source.file_name(span.file).unwrap_or(finding.file);
+                finding.notes.extend(interpreter.call_notes(&*source, &program.name()));
+                checked.add(program, finding);
             }
+            if cannot_go_on {
+                return Ok(checked);
+            }
+        }
+        match stepped {
+            Ok(Status::Ended) => return Ok(checked),
+            Ok(Status::Synch) => interpreter.set_machine_position_mm(face(frame.position())),
+            Err(_) if switches => interpreter.set_machine_position_mm(face(frame.position())),
+            Ok(Status::Running) | Err(_) => {}
         }
     }
 }
@@ -126,7 +163,7 @@ fn check_switch(
     mechanism: &mut Mechanism,
     code: (i32, Span),
     frame: &mut Frame,
-    checked: &mut Checked,
+    findings: &mut Vec<Diagnostic>,
 ) -> Result<(), Diagnostic> {
     let pose = Pose::from_array(*frame.position());
     let joints = mechanism.inverse(&pose).map_err(|error| {
@@ -135,7 +172,7 @@ fn check_switch(
     })?;
     let after = switched(program, machine, mechanism, code, &joints, &pose)?;
     if after.joints != joints {
-        checked.add(program, messages::form_switch(program, code.1));
+        findings.push(messages::form_switch(program, code.1));
     }
     *mechanism = after.mechanism;
     frame.set_position(after.pose.to_array());
@@ -184,10 +221,10 @@ fn check_move(
     mechanism: &Mechanism,
     step: &Move,
     span: Span,
-    checked: &mut Checked,
+    findings: &mut Vec<Diagnostic>,
 ) {
     if !step.rapid && !(step.feed.speed > 0.0) {
-        checked.add(program, messages::feed_unset(program, span));
+        findings.push(messages::feed_unset(program, span));
     }
     let length = step.geometry.length();
     let bend = if matches!(step.geometry, Geometry::Line(_)) { 1.0 } else { 4.0 };
@@ -218,10 +255,10 @@ fn check_move(
         }
     }
     if let Some((kind, pose)) = worst {
-        checked.add(program, messages::plan(program, machine, &PlanError { kind, span, pose }));
+        findings.push(messages::plan(program, machine, &PlanError { kind, span, pose }));
         return;
     }
     if let Some((value, joint, pose)) = nearest {
-        checked.add(program, messages::too_near_singularity(program, machine, span, &pose, joint, value));
+        findings.push(messages::too_near_singularity(program, machine, span, &pose, joint, value));
     }
 }

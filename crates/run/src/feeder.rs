@@ -59,6 +59,15 @@ pub(crate) fn face(pose: &Vector) -> pkm_canon::Position {
     pkm_canon::Position::from_array(v)
 }
 
+/// mm and rad.
+pub(crate) fn inside(position: &pkm_canon::Position) -> Vector {
+    let mut v = position.to_array();
+    for angle in &mut v[3..6] {
+        *angle = maths::radians(*angle);
+    }
+    v
+}
+
 /// The frame a program starts in.
 pub(crate) fn frame(machine: &Machine, start: &Pose) -> Frame {
     let tolerance = Tolerance { length_mm: machine.path.blend_tolerance, angle_rad: BLEND_RAD };
@@ -286,7 +295,7 @@ impl<'a> Feeder<'a> {
                 self.synch = status == Status::Synch;
             }
             Err(error) => {
-                let failure = error.to_diagnostic(&self.program.name(), self.interpreter.source_line());
+                let failure = self.interpreter.diagnose(&error, &*self.source, &self.program.name());
                 self.fail(failure);
             }
         }

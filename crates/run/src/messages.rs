@@ -28,6 +28,7 @@ fn at(
         line: span.line,
         column,
         end_column,
+        notes: Vec::new(),
     }
 }
 
@@ -225,7 +226,10 @@ pub(crate) fn not_checked_further(program: &Program, span: Span) -> Diagnostic {
     at(program, span, "not-checked", Severity::Note, message, "mend this block and check again")
 }
 
+/// The code of [`too_many`].
+pub(crate) const TOO_MANY: &str = "too-many";
+
 pub(crate) fn too_many(program: &Program, kept: usize) -> Diagnostic {
     let message = format!("only the first {kept} findings are listed");
-    at(program, Span::default(), "too-many", Severity::Note, message, "mend these and check again")
+    at(program, Span::default(), TOO_MANY, Severity::Note, message, "mend these and check again")
 }

@@ -4,13 +4,15 @@
 //! of its own. What is remembered: the places of subs already passed, and the labels of branches and loops.
 
 mod branches;
+mod recovery;
 mod subs;
 
 use super::Interpreter;
 use super::saved::Saved;
 use crate::error::{Error, ErrorKind};
 use crate::expression;
-use crate::lexer::{self, Keyword, Rest, into_fault};
+use crate::lexer::{Keyword, Rest, into_fault};
+use crate::o_word::{self, Head, LabelText, push_integer};
 use crate::parameters::ARGUMENTS;
 use crate::settings::Dialect;
 use crate::source::{LineSource, Place, SourceError};
@@ -23,9 +25,6 @@ const MAX_CALLS: usize = 9;
 
 /// A label, numbered in the order of first appearance.
 type Label = u32;
-
-/// A label as written: decimal digits or the name between the brackets.
-type LabelText = heapless::Vec<u8, 256>;
 
 /// Subs are known everywhere (scope 0), branches and loops only within the program (scope 1) or the sub they are in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -54,6 +53,8 @@ struct Sub {
 struct Frame {
     style: Style,
     sub: Label,
+    /// The call, for messages.
+    call: Span,
     return_to: Place,
     /// The place a Fanuc program starts again for its next repetition.
     body: Place,
@@ -81,6 +82,10 @@ pub(crate) struct Flow {
     /// A part of the present `if` has run.
     branch_taken: bool,
     text: LabelText,
+    /// The o-word of the line being executed, for recovery.
+    current: Option<(Name, Option<Keyword>, Span)>,
+    /// Labels of o-words that were wrong: what else is said about them only follows.
+    wrong: Vec<Label>,
 }
 
 impl Flow {
@@ -100,6 +105,27 @@ impl Flow {
     /// Open calls.
     pub(crate) fn depth(&self) -> usize {
         self.frames.len()
+    }
+
+    /// The open calls, innermost first.
+    pub(crate) fn calls(&self) -> impl Iterator<Item = Span> {
+        // A call whose sub is still looked for has not led anywhere.
+        let begun = usize::from(self.pending.is_some());
+        self.frames.iter().rev().skip(begun).map(|frame| frame.call)
+    }
+
+    /// All labels read so far, as written.
+    #[cfg(feature = "std")]
+    pub(crate) fn label_names(&self) -> impl Iterator<Item = &[u8]> {
+        self.labels.keys().map(|text| &**text)
+    }
+
+    /// The label of the sub that is looked for.
+    #[cfg(feature = "std")]
+    pub(crate) fn missing(&self) -> Option<&[u8]> {
+        self.pending?;
+        let wanted = self.skip?.label;
+        self.labels.iter().find(|(_, label)| **label == wanted).map(|(text, _)| &**text)
     }
 
     /// At the end of the file: the call without a sub.
@@ -141,45 +167,20 @@ impl Interpreter {
 
     /// Reads label and keyword behind the `o` at `start`.
     fn read_o_word(&mut self, start: usize) -> Result<OWord, Error> {
-        let code = self.line.code();
-        let fail = |fault| crate::block::fault_error(&self.line, fault);
-        let input = &code[start + 1..];
-        let mut text = LabelText::new();
-        let rest = if input.first() == Some(&b'<') {
-            let (rest, name) = lexer::name(input).map_err(|_| {
-                let kind = ErrorKind::ParamNameOpen;
-                self.flow_error(kind, self.line.code_span(start, code.len()))
-            })?;
-            let _ = text.extend_from_slice(name);
-            rest
-        } else {
-            if input.is_empty() {
-                return Err(self.flow_error(ErrorKind::OLabel, self.line.code_span(start, start + 1)));
-            }
-            let (rest, number) = expression::integer(input, &self.state).map_err(|e| fail(into_fault(e)))?;
-            push_integer(&mut text, number);
-            rest
-        };
-        let at = code.len() - rest.len();
-        let keyword = match lexer::keyword(rest) {
-            Ok((after, keyword)) => Some((keyword, code.len() - after.len())),
-            Err(_) if rest.is_empty() || rest[0] == b'(' => None,
-            Err(_) => {
-                let length = rest.iter().take_while(|b| b.is_ascii_alphanumeric()).count().max(1);
-                return Err(self.flow_error(ErrorKind::OUnknown, self.line.code_span(at, at + length)));
-            }
-        };
-        let end = keyword.map_or(at, |(_, end)| end);
-        let span = self.line.code_span(start, end);
-        self.flow.text.clear();
-        let _ = self.flow.text.extend_from_slice(&text);
+        let Head { label: text, keyword, operands, wrong } = o_word::head(&self.line, start, &self.state)?;
+        if let Some(error) = wrong {
+            let label = self.flow.intern(&text);
+            self.flow.wrong.push(label);
+            return Err(error);
+        }
+        let span = self.line.code_span(start, operands);
         let label = self.flow.intern(&text);
-        let keyword = keyword.map(|(keyword, _)| keyword);
+        self.flow.text = text;
         let scope = match keyword {
             None | Some(Keyword::Sub | Keyword::Endsub | Keyword::Call | Keyword::Return) => 0,
             Some(_) => self.scope(),
         };
-        Ok(OWord { name: Name { scope, label }, keyword, operands: end, span })
+        Ok(OWord { name: Name { scope, label }, keyword, operands, span })
     }
 
     /// Where the labels of branches and loops count. In LinuxCNC all calls of one sub share them: a repeat that a
@@ -228,7 +229,9 @@ impl Interpreter {
         here: Place,
         source: &mut dyn LineSource,
     ) -> Result<Option<Saved>, Error> {
+        self.flow.current = None;
         let word = self.read_o_word(start)?;
+        self.flow.current = Some((word.name, word.keyword, word.span));
         let begins_sub = matches!(word.keyword, None | Some(Keyword::Sub));
         if self.flow.defining.is_some() && begins_sub {
             return Err(self.flow_error(ErrorKind::ONestedSub, word.span));
@@ -237,6 +240,10 @@ impl Interpreter {
             return Ok(None);
         }
         let skipping = self.flow.skip.is_some();
+        if self.is_branch() && self.depends_on_an_error() {
+            // Recovery passes over it without another word.
+            return Err(self.flow_error(ErrorKind::ParamUndefined, word.span));
+        }
         let wanted = self.flow.pending.is_some();
         match word.keyword {
             None | Some(Keyword::Sub) if wanted => self.found_sub(&word, here, source)?,
@@ -250,15 +257,4 @@ impl Interpreter {
         }
         Ok(None)
     }
-}
-
-fn push_integer(text: &mut LabelText, number: i32) {
-    use core::fmt::Write;
-    struct Digits<'a>(&'a mut LabelText);
-    impl Write for Digits<'_> {
-        fn write_str(&mut self, s: &str) -> core::fmt::Result {
-            self.0.extend_from_slice(s.as_bytes()).map_err(|_| core::fmt::Error)
-        }
-    }
-    let _ = write!(Digits(text), "{number}");
 }

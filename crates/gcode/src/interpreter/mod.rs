@@ -14,6 +14,8 @@ mod motion;
 mod offsets;
 mod probing;
 mod queue;
+#[cfg(feature = "alloc")]
+mod recovery;
 mod saved;
 mod splines;
 mod state;
@@ -24,10 +26,10 @@ use crate::block::Block;
 use crate::error::{Error, ErrorKind};
 use crate::line::Line;
 use crate::parameters::{self, Parameters};
-use crate::settings::{Dialect, Settings};
+use crate::settings::{Dialect, MM_PER_INCH, Settings};
 use crate::source::{LineSource, Place};
 use crate::tool_table::ToolTable;
-use pkm_canon::{Canon, CanonSink, Position, Span};
+use pkm_canon::{Canon, CanonSink, LengthUnit, Position, Span};
 use queue::Queue;
 use state::State;
 
@@ -97,8 +99,12 @@ pub struct Interpreter {
     idle_blocks: u64,
     /// Blocks executed or passed over.
     blocks: u64,
+    /// The block has been read and is being executed.
+    executing: bool,
     #[cfg(feature = "alloc")]
     flow: flow::Flow,
+    #[cfg(feature = "alloc")]
+    recovery: recovery::Recovery,
 }
 
 impl Interpreter {
@@ -113,8 +119,11 @@ impl Interpreter {
             begun: false,
             idle_blocks: 0,
             blocks: 0,
+            executing: false,
             #[cfg(feature = "alloc")]
             flow: flow::Flow::default(),
+            #[cfg(feature = "alloc")]
+            recovery: recovery::Recovery::default(),
         }
     }
 
@@ -150,6 +159,18 @@ impl Interpreter {
         if (span.file, span.line) == (self.line.file, self.line.number) { self.line.raw() } else { &[] }
     }
 
+    /// The open calls, innermost first: where the block being executed was called from.
+    #[cfg(feature = "alloc")]
+    pub fn calls(&self) -> impl Iterator<Item = Span> {
+        self.flow.calls()
+    }
+
+    /// All labels of o-words read so far, and the one of a sub that is looked for.
+    #[cfg(feature = "std")]
+    pub(crate) fn labels(&self) -> (impl Iterator<Item = &[u8]>, Option<&[u8]>) {
+        (self.flow.label_names(), self.flow.missing())
+    }
+
     /// Where the program believes the tool is: program coordinates, program units, degrees.
     pub fn position(&self) -> Position {
         Position::from_array(self.state.position)
@@ -162,6 +183,22 @@ impl Interpreter {
             self.state.take_over_parameters();
         }
         self.state.set_machine_position_mm(position);
+    }
+
+    /// Where the program believes the machine stands: machine coordinates, mm and degrees, offsets included.
+    pub fn machine_position_mm(&self) -> Position {
+        let mut machine = self.state.machine_point(self.state.position);
+        if self.state.modal.units == LengthUnit::Inch {
+            state::scale_lengths(&mut machine, MM_PER_INCH);
+        }
+        Position::from_array(machine)
+    }
+
+    /// After [`Interpreter::go_on`]: the code of the machine's own that stands in the block at fault. The caller does it all the same,
+    /// so that what follows is not misjudged.
+    #[cfg(feature = "alloc")]
+    pub fn lost_machine_code(&self) -> Option<(i32, Span)> {
+        self.recovery.lost_code
     }
 
     /// Tells the interpreter where the tool is: program coordinates, program units, degrees.
@@ -210,9 +247,22 @@ impl Interpreter {
     ///
     /// # Errors
     /// What is wrong with the block and where. Commands of the block that come before the error in the order of
-    /// execution have been emitted. The next step goes on with the next block.
+    /// execution have been emitted. The next step goes on with the next block; what would only repeat or follow from
+    /// an error that was returned is not returned again (with the feature `alloc`).
     pub fn step(&mut self, source: &mut dyn LineSource, sink: &mut dyn CanonSink) -> Result<Status, Error> {
         self.start(sink);
+        #[cfg(feature = "alloc")]
+        self.go_on(source, sink);
+        let here = source.place();
+        let stepped = self.step_block(source, sink);
+        #[cfg(feature = "alloc")]
+        let stepped = self.recover(stepped, here, source, sink);
+        #[cfg(not(feature = "alloc"))]
+        let _ = here;
+        stepped
+    }
+
+    fn step_block(&mut self, source: &mut dyn LineSource, sink: &mut dyn CanonSink) -> Result<Status, Error> {
         if self.phase == Phase::Ended {
             return Ok(Status::Ended);
         }
@@ -261,11 +311,12 @@ impl Interpreter {
             Phase::Running { framed: false } => ErrorKind::FileNoEnd,
             _ => ErrorKind::FileEmpty,
         };
-        self.phase = Phase::Ended;
+        // The search for a sub ends here; the program may go on behind its call.
         #[cfg(feature = "alloc")]
         if let Some(error) = self.flow.unanswered() {
             return error;
         }
+        self.phase = Phase::Ended;
         let end = self.line.raw().len();
         Error { kind, span: self.line.span(end, end) }
     }
@@ -297,8 +348,12 @@ impl Interpreter {
         match trimmed {
             [] => return Ok(Status::Running),
             b"%" if framed => {
-                self.phase = Phase::Ended;
                 sink.command(&Canon::Finish, self.line.whole());
+                #[cfg(feature = "alloc")]
+                if let Some(error) = self.flow.unanswered() {
+                    return Err(error);
+                }
+                self.phase = Phase::Ended;
                 #[cfg(feature = "alloc")]
                 if let Some(error) = self.flow.unclosed() {
                     return Err(error);
@@ -318,6 +373,13 @@ impl Interpreter {
         if self.is_skipping() {
             return Ok(Status::Running);
         }
+        self.executing = false;
+        #[cfg(feature = "alloc")]
+        if self.depends_on_an_error() {
+            self.salvage(start, source, sink);
+            let ended = self.phase == Phase::Ended;
+            return Ok(if ended { Status::Ended } else { Status::Running });
+        }
         self.block.read(&self.line, start, &self.state, &self.state.reader())?;
         self.state.complete(&mut self.block)?;
         if self.block.motion.is_some() || self.block.has_pause() {
@@ -328,6 +390,7 @@ impl Interpreter {
             return Ok(status);
         }
         let mut out = Out { sink, span: self.block.span(), queue: &mut self.queue };
+        self.executing = true;
         let status = self.state.execute(&mut self.block, &self.line, &mut out)?;
         if out.queue.overflow {
             self.phase = Phase::Ended;

@@ -10,7 +10,7 @@ use crate::render::diagnostics::{Json, Messages};
 use atomic_write_file::AtomicWriteFile;
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::text::{Spelling, TextWriter};
-use pkm_canon::{CanonSink, Motion9Writer};
+use pkm_canon::{CanonSink, FileId, Motion9Writer};
 use pkm_gcode::{
     FileSource, Interpreter, LineSource, MemorySource, Place, Settings, SourceError, ToolTable, canon_text_of,
 };
@@ -129,8 +129,9 @@ fn print<W: Write>(
         CanonFormat::Json => Box::new(JsonWriter::new(line, &name)),
     };
     let mut source = Stoppable { source, stop: &stop };
-    canon_text_of(interpreter, &mut source, &mut *sink, |error, text| {
-        let diagnostic = error.to_diagnostic(&name, text);
+    canon_text_of(interpreter, &mut source, &mut *sink, |error, interpreter, source| {
+        let text = interpreter.source_line();
+        let diagnostic = interpreter.diagnose(error, source, &name);
         if arguments.format == CanonFormat::Json {
             let object = json!({ "schema": pkm_run::SCHEMA, "diagnostic": Json::from(&diagnostic) });
             line(format!("{object}\n").as_bytes());
@@ -168,5 +169,9 @@ impl LineSource for Stoppable<'_> {
 
     fn find_subroutine(&mut self, name: &str) -> Result<Option<Place>, SourceError> {
         self.source.find_subroutine(name)
+    }
+
+    fn file_name(&self, file: FileId) -> Option<String> {
+        self.source.file_name(file)
     }
 }

@@ -54,6 +54,7 @@ impl Kept {
             line,
             column: 1,
             end_column: 1,
+            notes: Vec::new(),
         })?;
         Ok((Self { path: path.to_owned(), file, old: Some(text) }, parameters))
     }

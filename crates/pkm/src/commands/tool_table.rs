@@ -36,6 +36,7 @@ pub(crate) fn read(path: &Path, messages: &Messages) -> Result<ToolTable, Failur
             line,
             column: 1,
             end_column: 1,
+            notes: Vec::new(),
         })
         .collect();
     messages.print(&warnings);

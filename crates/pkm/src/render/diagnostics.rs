@@ -18,7 +18,20 @@ pub(crate) struct Json<'a> {
     file: &'a str,
     line: u32,
     column: u32,
+    end_column: u32,
     help: Option<&'a str>,
+    /// Where the sub was called, where a loop begins; nearest first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    notes: Vec<JsonNote<'a>>,
+}
+
+/// Another place that belongs to a diagnostic.
+#[derive(Debug, Serialize)]
+struct JsonNote<'a> {
+    message: &'a str,
+    file: &'a str,
+    line: u32,
+    column: u32,
 }
 
 impl<'a> From<&'a Diagnostic> for Json<'a> {
@@ -35,7 +48,18 @@ impl<'a> From<&'a Diagnostic> for Json<'a> {
             file: &diagnostic.file,
             line: diagnostic.line,
             column: diagnostic.column,
+            end_column: diagnostic.end_column,
             help: diagnostic.help.as_deref(),
+            notes: diagnostic
+                .notes
+                .iter()
+                .map(|note| JsonNote {
+                    message: &note.message,
+                    file: &note.file,
+                    line: note.line,
+                    column: note.column,
+                })
+                .collect(),
         }
     }
 }
@@ -98,17 +122,16 @@ impl Messages {
         let title = level.primary_title(diagnostic.message.as_str()).id(diagnostic.code.as_str());
         let mut group = Group::with_title(title);
         let line = self.source_line(diagnostic);
+        let snippet = |line, text, path, columns: (u32, u32)| {
+            Snippet::source(text)
+                .line_start(line as usize)
+                .path(path)
+                .annotation(AnnotationKind::Primary.span(span(text, columns)))
+        };
         match &line {
             Some(line) => {
-                let start = (diagnostic.column as usize).saturating_sub(1).min(line.len());
-                let end = (diagnostic.end_column as usize).saturating_sub(1).clamp(start, line.len());
-                let span = floor(line, start)..floor(line, end);
-                group = group.element(
-                    Snippet::source(line.as_str())
-                        .line_start(diagnostic.line as usize)
-                        .path(diagnostic.file.as_str())
-                        .annotation(AnnotationKind::Primary.span(span)),
-                );
+                let columns = (diagnostic.column, diagnostic.end_column);
+                group = group.element(snippet(diagnostic.line, line, diagnostic.file.as_str(), columns));
             }
             None => {
                 let mut origin = Origin::path(diagnostic.file.as_str());
@@ -124,7 +147,23 @@ impl Messages {
         if let Some(help) = &diagnostic.help {
             group = group.element(Level::HELP.message(help.as_str()));
         }
-        self.renderer.render(&[group])
+        let notes: Vec<_> =
+            diagnostic.notes.iter().map(|note| (note, line_of(&note.file, note.line))).collect();
+        let mut groups = vec![group];
+        for (note, line) in &notes {
+            let mut group = Group::with_title(Level::NOTE.secondary_title(note.message.as_str()));
+            group = match line {
+                Some(line) => group.element(snippet(
+                    note.line,
+                    line,
+                    note.file.as_str(),
+                    (note.column, note.end_column),
+                )),
+                None => group.element(Origin::path(note.file.as_str()).line(note.line as usize)),
+            };
+            groups.push(group);
+        }
+        self.renderer.render(&groups)
     }
 
     /// The source line of a diagnostic, if it can be read again.
@@ -140,10 +179,22 @@ impl Messages {
         {
             from_text(text)?
         } else {
-            line_of_file(&diagnostic.file, number)?
+            line_of(&diagnostic.file, diagnostic.line)?
         };
         Some(line)
     }
+}
+
+/// A line of a file (counted from 1), if it can be read again.
+fn line_of(path: &str, line: u32) -> Option<String> {
+    if path == "-" { None } else { line_of_file(path, (line as usize).checked_sub(1)?) }
+}
+
+/// Columns (counted from 1) as a stretch of the line.
+fn span(line: &str, (column, end_column): (u32, u32)) -> std::ops::Range<usize> {
+    let start = (column as usize).saturating_sub(1).min(line.len());
+    let end = (end_column as usize).saturating_sub(1).clamp(start, line.len());
+    floor(line, start)..floor(line, end)
 }
 
 /// A line of a file (counted from 0), at most [`LONGEST_LINE`] bytes of it.

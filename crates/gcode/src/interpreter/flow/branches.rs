@@ -10,7 +10,7 @@ use crate::source::{LineSource, Place};
 use pkm_canon::Span;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(super) enum Kind {
     If,
     While,
     Do,
@@ -20,11 +20,11 @@ enum Kind {
 /// What a label stands for, and the line that first said so.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Construct {
-    kind: Kind,
-    line: Place,
+    pub(super) kind: Kind,
+    pub(super) line: Place,
     pub(super) span: Span,
     /// How often a repeat is still to run; `None` = its count is read when it is met next.
-    left: Option<i64>,
+    pub(super) left: Option<i64>,
 }
 
 impl Interpreter {

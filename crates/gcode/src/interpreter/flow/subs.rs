@@ -151,6 +151,7 @@ impl Interpreter {
         self.flow.frames.push(Frame {
             style,
             sub: label,
+            call: span,
             return_to,
             body: target.unwrap_or(return_to),
             repeats_left: repeats - 1,
@@ -185,7 +186,7 @@ impl Interpreter {
         Ok(saved)
     }
 
-    fn leave(&mut self, source: &mut dyn LineSource) -> Result<Option<Saved>, Error> {
+    pub(super) fn leave(&mut self, source: &mut dyn LineSource) -> Result<Option<Saved>, Error> {
         let Some(frame) = self.flow.frames.pop() else { return Ok(None) };
         let saved = self.state.forget_saved();
         if self.state.settings.dialect == Dialect::Pkm {
@@ -220,7 +221,11 @@ impl Interpreter {
     }
 
     /// M99: returns from a Fanuc program. False at the main level, where it ends the program.
-    fn fanuc_return(&mut self, source: &mut dyn LineSource, sink: &mut dyn CanonSink) -> Result<bool, Error> {
+    pub(super) fn fanuc_return(
+        &mut self,
+        source: &mut dyn LineSource,
+        sink: &mut dyn CanonSink,
+    ) -> Result<bool, Error> {
         let span = self.block.m_span(crate::modal::MGroup::Stop);
         let Some(frame) = self.flow.frames.last_mut() else { return Ok(false) };
         if frame.style == Style::OWord {
