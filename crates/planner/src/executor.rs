@@ -6,7 +6,8 @@ use crate::PlanError;
 use crate::grid::Node;
 use crate::interval::{accelerations, exits};
 use crate::limits::{Rows, Sample};
-use crate::planner::{Planner, Setpoint, State};
+use crate::operator::Panel;
+use crate::planner::{PathMode, Planner, Setpoint, State};
 use pkm_kins::{Kinematics, Pose, maths::sqrt};
 
 /// Nodes passed in one tick at the very most (the grid holds the speed down to about 128).
@@ -39,10 +40,11 @@ pub(crate) struct Executor {
     dwells: bool,
     /// Servo periods still to rest at a stop.
     settle: u32,
-    hold: bool,
-    abort: bool,
-    feed_override: f64,
-    rapid_override: f64,
+    pub(crate) hold: bool,
+    pub(crate) abort: bool,
+    pub(crate) panel: Panel,
+    /// Single block: on the way, until the next node.
+    pub(crate) stepped: bool,
     /// Nodes passed ([`crate::Work`]) when the last servo period began.
     passed_before: u64,
 }
@@ -60,8 +62,8 @@ impl Executor {
             settle: 0,
             hold: false,
             abort: false,
-            feed_override: 1.0,
-            rapid_override: 1.0,
+            panel: Panel::NEUTRAL,
+            stepped: false,
             passed_before: 0,
         }
     }
@@ -79,10 +81,12 @@ impl Executor {
         self.x = 0.0;
         self.planned = false;
         self.abort = false;
+        self.stepped = false;
     }
 
-    pub(crate) fn overrides(&self) -> (f64, f64) {
-        (self.feed_override, self.rapid_override)
+    /// At rest at the front node.
+    pub(crate) fn is_at_node(&self) -> bool {
+        self.x == 0.0 && self.sigma == 0.0
     }
 
     /// What is permitted has changed: the rest of the interval is planned again.
@@ -92,45 +96,6 @@ impl Executor {
 }
 
 impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Planner<K, R, PIECES, NODES> {
-    /// Feed override, 1 = 100 %, clamped to 0 to 2. What is not finite is refused: false, and nothing changes.
-    pub fn set_feed_override(&mut self, factor: f64) -> bool {
-        let rapid = self.executor.rapid_override;
-        self.set_overrides(factor, rapid)
-    }
-
-    /// Rapid override, 1 = 100 %, clamped to 0 to 1. What is not finite is refused: false, and nothing changes.
-    pub fn set_rapid_override(&mut self, factor: f64) -> bool {
-        let feed = self.executor.feed_override;
-        self.set_overrides(feed, factor)
-    }
-
-    fn set_overrides(&mut self, feed: f64, rapid: f64) -> bool {
-        if !feed.is_finite() || !rapid.is_finite() {
-            return false;
-        }
-        let (feed, rapid) = (feed.clamp(0.0, 2.0), rapid.clamp(0.0, 1.0));
-        if (feed, rapid) != self.executor.overrides() {
-            self.executor.feed_override = feed;
-            self.executor.rapid_override = rapid;
-            self.executor.planned = false;
-        }
-        true
-    }
-
-    /// Feed hold: brakes to rest on the path as fast as the limits allow; false resumes.
-    pub fn hold(&mut self, hold: bool) {
-        if self.executor.hold != hold {
-            self.executor.hold = hold;
-            self.executor.planned = false;
-        }
-    }
-
-    /// Brakes to rest on the path, then empties the queue: the program is over, the machine stays where it is.
-    pub fn abort(&mut self) {
-        self.executor.abort = true;
-        self.executor.planned = false;
-    }
-
     /// One servo period (or one of its `substeps`). The result is where the machine has to be at its end.
     ///
     /// # Errors
@@ -143,7 +108,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             let passed = (self.work.passed - self.executor.passed_before) as usize;
             self.executor.passed_before = self.work.passed;
             let _ = self.refill(passed);
-            self.release_if_starving();
+            // Who is held up does not starve.
+            if !held && !self.waits_for_step() {
+                self.release_if_starving();
+            }
             self.begin_period(held);
         }
         let substeps = self.settings.substeps.max(1);
@@ -156,15 +124,16 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             }
         }
         let mut state = if self.executor.dwells { State::Dwell } else { State::Moving };
-        let over = self.executor.abort && self.executor.at_rest();
-        if self.executor.at_rest() {
-            if over {
-                state = State::Idle;
-            } else if held {
-                state = State::Held;
-            } else if self.is_idle() {
-                state = State::Idle;
-            }
+        let rests = self.executor.has_settled();
+        let over = self.executor.abort && rests;
+        if over {
+            state = State::Idle;
+        } else if held && rests {
+            state = State::Held;
+        } else if self.is_idle() {
+            state = State::Idle;
+        } else if rests && !self.executor.dwells && self.waits_for_step() {
+            state = State::BlockEnd;
         }
         let setpoint = self.publish(state);
         if over {
@@ -176,23 +145,25 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// A dwell takes whole servo periods; the last one may be cut short.
     fn begin_period(&mut self, held: bool) {
-        let at_rest = self.executor.at_rest() && self.executor.sigma == 0.0;
         let period_ns = pkm_kins::maths::round(self.settings.servo_period_s * 1e9) as u64;
+        let at_node = self.executor.is_at_node();
+        // Held or not: what averages the setpoints goes on.
+        let settles = self.executor.settle > 0;
+        self.executor.settle = self.executor.settle.saturating_sub(1);
+        let waits = settles || self.waits_for_step();
         let dwells = match self.nodes.front_mut() {
-            Some(node) if at_rest && node.dwell_ns > 0 => {
+            Some(node) if at_node && !waits && node.dwell_ns > 0 => {
                 if !held {
                     node.dwell_ns = node.dwell_ns.saturating_sub(period_ns);
+                    // The dwell was a block of its own.
+                    self.executor.stepped &= node.dwell_ns > 0;
                 }
                 true
             }
             _ => false,
         };
-        let settles = self.executor.settle > 0 && !held;
-        if settles {
-            self.executor.settle -= 1;
-        }
         self.executor.dwells = dwells;
-        self.executor.waits = dwells || settles;
+        self.executor.waits = dwells || waits;
     }
 
     /// The open end of the last move is released when the machine would have to brake for want of it.
@@ -202,19 +173,20 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             self.grid.piece == last && self.pieces.back().is_some_and(|p| p.open && self.grid.s >= p.to);
         let all_planned = self.grid.planned >= self.nodes.len() && !self.grid.is_planning();
         if all_known && all_planned && self.brakes_now() {
-            self.finish();
+            self.starved = self.pieces.back().is_some_and(|last| last.mode != PathMode::ExactStop);
+            self.release();
             let _ = self.refill(0);
         }
     }
 
     /// True when within two servo periods, at the fastest, the machine would brake for the end of the queue.
     fn brakes_now(&self) -> bool {
-        let (rows, (feed, rapid)) = (self.limits.rows(), self.executor.overrides());
+        let (rows, panel) = (self.limits.rows(), self.executor.panel);
         let Some(front) = self.nodes.front() else { return false };
         // The interval being driven counts as driven.
         let mut x = self.executor.legs.last().map_or(self.executor.x, |leg| leg.x);
         let here = front.distance + self.executor.sigma;
-        let share = self.grid.share(1, (feed, rapid));
+        let share = self.grid.share(1, panel);
         let known = self.nodes.iter().skip(1);
         for (from, to) in known.zip(self.nodes.iter().skip(2)) {
             if from.distance > here + 2.0 * sqrt(x) * self.settings.servo_period_s {
@@ -227,7 +199,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 }
                 x = entry;
             }
-            x = exits(&from.right, &to.left, rows, from.length, x).1.min(to.cap(feed, rapid));
+            x = exits(&from.right, &to.left, rows, from.length, x).1.min(to.cap(panel));
         }
         true
     }
@@ -250,8 +222,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                         remaining -= duration;
                         self.executor.x = x_end;
                         self.pass_node();
-                        if self.nodes.front().is_some_and(|node| node.stop) {
-                            self.executor.x = 0.0;
+                        if self.stops_here() {
                             return true;
                         }
                         continue;
@@ -291,17 +262,29 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             e.planned = false;
             e.sigma = 0.0;
             self.pass_node();
-            if self.nodes.front().is_some_and(|node| node.stop) || self.executor.x == 0.0 {
-                self.executor.x = 0.0;
+            if self.stops_here() {
                 return true;
             }
         }
         false
     }
 
+    /// True at rest at the front node. Where the plan says rest, what is left of the speed is rounding.
+    fn stops_here(&mut self) -> bool {
+        const REST_MM: f64 = 1e-9;
+        let in_a_period = sqrt(self.executor.x) * self.settings.servo_period_s;
+        let single = self.executor.panel.single_block && in_a_period <= REST_MM;
+        let stops = self.nodes.front().is_some_and(|node| node.stop || single && node.blocks > 0);
+        if stops {
+            self.executor.x = 0.0;
+        }
+        self.executor.x == 0.0
+    }
+
     fn pass_node(&mut self) {
         self.nodes.pop_front();
         self.work.passed += 1;
+        self.executor.stepped = false;
         self.grid.shift();
         let Some(front) = self.nodes.front() else { return };
         // The piece before stays: the setpoint of a stop at its end is still on it.
@@ -322,7 +305,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             self.limits.sample(&self.kinematics, piece, node.s + sigma, &mut sample).ok().map(|()| sample)
         });
         let here = anew.as_ref().map_or(&node.right, |sample| &sample.rows);
-        let (feed, rapid) = self.executor.overrides();
+        let panel = self.executor.panel;
         // What is being driven, if it leads to the node (a braking leg may end before).
         let running =
             self.executor.legs.last().filter(|leg| sigma > 0.0 && leg.end >= node.length).map(|leg| leg.x);
@@ -350,7 +333,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 return false;
             }
             // A stop to the left does not cap what is in between.
-            let cap = node.speed_cap(feed, rapid).min(next.speed_cap(feed, rapid));
+            let cap = node.speed_cap(panel).min(next.speed_cap(panel));
             // A peak in between gains something only where the exit is held down by what follows, not by the strips,
             // and where the interval takes more than a quarter of a period.
             let brief = self.is_brief(length, x.min(x_end));
@@ -381,8 +364,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// The x at which node `index` may be passed under the overrides of now.
     fn permitted(&self, index: usize, node: &Node<R>) -> f64 {
-        let (feed, rapid) = self.executor.overrides();
-        (node.entry * self.grid.share(index, (feed, rapid))).min(node.cap(feed, rapid))
+        let panel = self.executor.panel;
+        (node.entry * self.grid.share(index, panel)).min(node.cap(panel))
     }
 
     /// True if `length` takes less than a quarter of a servo period at √x.
@@ -407,6 +390,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn publish(&mut self, state: State) -> Result<Setpoint, PlanError> {
         let at_rest = self.executor.at_rest();
         self.setpoint.state = state;
+        self.setpoint.starved = self.starved;
         let Some(node) = self.nodes.front() else {
             self.setpoint.joint_velocity = Default::default();
             return Ok(self.setpoint);
@@ -432,6 +416,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             feed_use: piece.feed.share(&point.first, speed),
             span: piece.span,
             state,
+            starved: self.starved,
         };
         Ok(self.setpoint)
     }

@@ -7,8 +7,10 @@
 use crate::PlanError;
 use crate::interval::fastest_entry;
 use crate::limits::{FASTEST, Rows, Sample};
+use crate::operator::Panel;
 use crate::path::Geometry;
 use crate::planner::{Piece, Planner};
+use pkm_canon::Span;
 use pkm_kins::{Kinematics, maths::sqrt};
 
 /// Change of the strips from node to node, in shares of the limits.
@@ -45,6 +47,8 @@ pub(crate) struct Node<const R: usize> {
     pub(crate) stop: bool,
     /// And for so long.
     pub(crate) dwell_ns: u64,
+    /// Blocks that end here: in single block the machine rests here as often.
+    pub(crate) blocks: u8,
     /// Strips at the end of the interval to the left and at the start of the one to the right.
     pub(crate) left: Rows<R>,
     pub(crate) right: Rows<R>,
@@ -53,15 +57,15 @@ pub(crate) struct Node<const R: usize> {
 }
 
 impl<const R: usize> Node<R> {
-    /// Cap on x with the overrides (1 = 100 %).
-    pub(crate) fn cap(&self, feed_override: f64, rapid_override: f64) -> f64 {
-        if self.stop { 0.0 } else { self.speed_cap(feed_override, rapid_override) }
+    /// Cap on x with what the operator has set.
+    pub(crate) fn cap(&self, panel: Panel) -> f64 {
+        if self.stop || panel.single_block && self.blocks > 0 { 0.0 } else { self.speed_cap(panel) }
     }
 
     /// The same without regard to a stop.
-    pub(crate) fn speed_cap(&self, feed_override: f64, rapid_override: f64) -> f64 {
-        let hard = if self.rapid { self.hard * rapid_override * rapid_override } else { self.hard };
-        hard.min(self.feed * feed_override * feed_override)
+    pub(crate) fn speed_cap(&self, panel: Panel) -> f64 {
+        let hard = if self.rapid { self.hard * panel.rapid * panel.rapid } else { self.hard };
+        hard.min(self.feed * panel.feed * panel.feed)
     }
 }
 
@@ -80,8 +84,11 @@ pub(crate) struct Grid<const R: usize> {
     depth: usize,
     /// As far as this (the nodes' `distance`) nothing depends on where the queue ends.
     pub(crate) settled: f64,
-    /// The overrides (feed, rapid) they were planned with.
-    overrides: (f64, f64),
+    /// So many of them were planned with what the operator has set now, or had when this changed last; the others with
+    /// no higher overrides than these.
+    fresh: usize,
+    current: Panel,
+    before: Panel,
     /// The look-ahead under way.
     pass: Option<Pass>,
 }
@@ -91,14 +98,18 @@ pub(crate) struct Grid<const R: usize> {
 /// grants.
 #[derive(Debug, Clone, Copy)]
 struct Pass {
-    /// Nodes taken in; the index of the one planned last; how many were planned before, with the same overrides.
+    /// Nodes taken in; the index of the one planned last, and of the one before which it ends; how many were planned
+    /// before, with the same overrides.
     end: usize,
     next: usize,
+    first: usize,
     known: usize,
     /// Of these, planned again.
     depth: usize,
     settled: f64,
-    overrides: (f64, f64),
+    /// The operator has turned something: it plans anew what is planned.
+    anew: bool,
+    panel: Panel,
 }
 
 impl<const R: usize> Grid<R> {
@@ -112,7 +123,9 @@ impl<const R: usize> Grid<R> {
             planned: 0,
             depth: 0,
             settled: f64::NEG_INFINITY,
-            overrides: (1.0, 1.0),
+            fresh: 0,
+            current: Panel::NEUTRAL,
+            before: Panel::NEUTRAL,
             pass: None,
         }
     }
@@ -125,23 +138,23 @@ impl<const R: usize> Grid<R> {
     /// The node at the front is passed.
     pub(crate) fn shift(&mut self) {
         self.planned = self.planned.saturating_sub(1);
+        self.fresh = self.fresh.saturating_sub(1);
         if let Some(pass) = &mut self.pass {
             pass.end = pass.end.saturating_sub(1);
             pass.next = pass.next.saturating_sub(1);
+            pass.first = pass.first.saturating_sub(1);
             pass.known = pass.known.saturating_sub(1);
         }
     }
 
-    /// The share of its planned entry at which node `index` may be passed now. A plan made with higher overrides is
-    /// admissible, feeds included, when it is driven slower throughout: x and s̈ by one factor (Pham & Pham 2018).
-    pub(crate) fn share(&self, index: usize, (feed, rapid): (f64, f64)) -> f64 {
-        let (planned_feed, planned_rapid) = match self.pass {
-            Some(pass) if index >= pass.next => pass.overrides,
-            _ => self.overrides,
+    /// The share of its planned entry at which node `index` may be passed now.
+    pub(crate) fn share(&self, index: usize, now: Panel) -> f64 {
+        let planned = match self.pass {
+            Some(pass) if pass.anew && (pass.next..pass.end).contains(&index) => pass.panel,
+            _ if index < self.fresh || self.fresh == self.planned => self.current,
+            _ => self.before,
         };
-        let slower = |now: f64, planned: f64| if now < planned { now / planned } else { 1.0 };
-        let factor = slower(feed, planned_feed).min(slower(rapid, planned_rapid));
-        factor * factor
+        now.share(planned)
     }
 }
 
@@ -198,6 +211,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             rapid: piece.rapid,
             stop: true,
             dwell_ns: piece.dwell_ns,
+            blocks: 1,
             left: sample.rows,
             right: sample.rows,
             distance: 0.0,
@@ -218,17 +232,20 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     /// The end of a piece: what begins here joins the last node. False if nothing follows yet.
     fn next_piece(&mut self) -> Result<bool, PlanError> {
         let number = self.grid.piece + 1;
-        let stop = self.piece(self.grid.piece).is_some_and(|ended| ended.stop);
+        let (stop, span) = self.piece(self.grid.piece).map_or((false, None), |p| (p.stop, Some(p.span)));
         let index = number.wrapping_sub(self.first_piece) as usize;
         let Some(next) = self.pieces.get(index) else { return Ok(false) };
         let (from, rapid, dwell_ns) = (next.from, next.rapid, next.dwell_ns);
         let still = matches!(next.geometry, Geometry::Hold(_));
+        // A new source line is a new block; a dwell always is.
+        let block = still || span.is_some_and(|span| !is_same_block(span, next.span));
         if !still {
             self.limits.sample(&self.kinematics, next, from, &mut self.grid.last)?;
         }
         let Some(tail) = self.nodes.back_mut() else { return Ok(false) };
         tail.stop |= stop || still;
         tail.dwell_ns += dwell_ns;
+        tail.blocks = tail.blocks.saturating_add(u8::from(block));
         if !still {
             let sample = &self.grid.last;
             tail.right = sample.rows;
@@ -304,6 +321,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             rapid: piece.rapid,
             stop: false,
             dwell_ns: 0,
+            blocks: 0,
             left: sample.rows,
             right: sample.rows,
             distance,
@@ -322,32 +340,58 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         }
     }
 
-    /// Begins a pass if one is due: with other overrides over what is planned, else over more than that.
+    /// Begins a pass if one is due: anew over what is planned, if the operator has turned something, else over more.
     fn begin_pass(&mut self) -> bool {
-        let overrides = self.executor.overrides();
+        let panel = self.executor.panel;
         let (known, all) = (self.grid.planned, self.nodes.len());
-        let anew = self.grid.overrides != overrides;
-        if anew && known < 2 {
-            self.grid.overrides = overrides;
-            return self.begin_pass();
+        if panel != self.grid.current {
+            let stale = self.grid.fresh < known;
+            let before = if stale { self.grid.current.highest(self.grid.before) } else { self.grid.current };
+            self.grid.before = before;
+            self.grid.current = panel;
+            self.grid.fresh = 0;
+            self.grid.settled = f64::NEG_INFINITY;
+        }
+        if self.grid.fresh < known {
+            // As far as the next stop nothing depends on what follows.
+            let first = self.grid.fresh.max(1);
+            let ends = |node: &Node<R>| node.cap(panel) == 0.0;
+            let stop = self.nodes.iter().take(known).skip(first).take(STRETCH).position(ends);
+            let end = stop.map_or(known, |offset| first + offset + 1);
+            if let Some(node) = self.nodes.get_mut(end - 1).filter(|_| stop.is_some()) {
+                node.entry = 0.0;
+            }
+            self.grid.pass = Some(Pass {
+                end,
+                next: end - 1,
+                first,
+                known: 0,
+                depth: 0,
+                settled: self.grid.settled,
+                anew: true,
+                panel,
+            });
+            return true;
         }
         let soon = self.nodes.get(2 * NODES_PER_TICK).or(self.nodes.back());
         let settled = soon.is_none_or(|node| self.grid.settled >= node.distance);
         // A pass over fewer new nodes than it plans anew is worth it only when no more come.
         let early = all - known < self.grid.depth.min(STRETCH) && self.grows();
-        if !anew && (known >= all || settled || early) {
+        if known >= all || settled || early {
             return false;
         }
         // Each pass takes in as much more as the last one had to plan again: all in all no more than about three times
         // what the queue holds.
-        let end = if anew { known } else { (known + self.grid.depth.max(STRETCH)).min(all) };
+        let end = (known + self.grid.depth.max(STRETCH)).min(all);
         self.grid.pass = Some(Pass {
             end,
             next: end - 1,
-            known: if anew { 0 } else { known },
+            first: 1,
+            known,
             depth: 0,
-            settled: if anew { f64::NEG_INFINITY } else { self.grid.settled },
-            overrides,
+            settled: self.grid.settled,
+            anew: false,
+            panel,
         });
         true
     }
@@ -364,15 +408,14 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn continue_pass(&mut self, mut budget: usize) -> usize {
         let rows = self.limits.rows();
         let Some(mut pass) = self.grid.pass.take() else { return budget };
-        let (feed, rapid) = pass.overrides;
-        while pass.next > 1 {
+        while pass.next > pass.first.max(1) {
             if budget == 0 {
                 self.grid.pass = Some(pass);
                 return 0;
             }
             let i = pass.next - 1;
             let (Some(node), Some(after)) = (self.nodes.get(i), self.nodes.get(pass.next)) else { break };
-            let cap = node.cap(feed, rapid).min(FASTEST);
+            let cap = node.cap(pass.panel).min(FASTEST);
             let entry = if cap > 0.0 {
                 fastest_entry(&node.right, &after.left, rows, node.length, cap, after.entry)
             } else {
@@ -395,16 +438,22 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             }
             pass.next = i;
         }
-        if self.grid.overrides != pass.overrides {
-            // The interval being driven was planned with the old ones.
-            self.grid.overrides = pass.overrides;
-            self.executor.replan();
-        }
-        self.grid.planned = pass.end;
-        self.grid.depth = pass.depth;
         self.grid.settled = pass.settled;
+        if pass.anew {
+            // The interval being driven was planned with what was set before.
+            self.grid.fresh = pass.end.min(self.grid.planned);
+            self.executor.replan();
+        } else {
+            self.grid.planned = pass.end;
+            self.grid.fresh = pass.end;
+            self.grid.depth = pass.depth;
+        }
         budget
     }
+}
+
+fn is_same_block(a: Span, b: Span) -> bool {
+    (a.file, a.line) == (b.file, b.line)
 }
 
 /// The largest step ≤ `step` that divides `remaining` evenly.

@@ -20,6 +20,7 @@ mod interval;
 mod jerk;
 mod limits;
 mod merge;
+mod operator;
 pub mod path;
 mod planner;
 mod switch;

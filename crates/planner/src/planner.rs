@@ -62,10 +62,14 @@ pub enum PushError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum State {
+    /// At rest, and everything pushed has been driven.
     Idle,
     Moving,
     Dwell,
+    /// Feed hold, at rest.
     Held,
+    /// Single block, at rest at the end of a block: [`Planner::step`] goes on.
+    BlockEnd,
 }
 
 /// Where the machine has to be at the end of a servo period.
@@ -89,6 +93,9 @@ pub struct Setpoint {
     pub span: Span,
     /// Moving, held, ...
     pub state: State,
+    /// The queue has run dry: the machine stops, or has stopped, at the end of what is known and not where the program
+    /// would. It ends with the next push, and with [`Planner::finish`], which says that this was the end.
+    pub starved: bool,
 }
 
 /// What the planner has done since it was made: its work is bounded in these.
@@ -102,6 +109,9 @@ pub struct Work {
     pub planned: u64,
     /// Nodes driven past.
     pub passed: u64,
+    /// Stops, or all but, that were not the program's: the next move came only after the machine had begun to brake for
+    /// want of it.
+    pub starved: u64,
 }
 
 /// A move, or a blend between two, cut to what is really driven: s from `from` to `to`.
@@ -119,7 +129,7 @@ pub(crate) struct Piece {
     /// A corner blend after move `motion`.
     pub(crate) corner: bool,
     pub(crate) dwell_ns: u64,
-    mode: PathMode,
+    pub(crate) mode: PathMode,
     pub(crate) motion: u32,
     pub(crate) span: Span,
 }
@@ -155,6 +165,8 @@ pub struct Planner<K, const R: usize, const PIECES: usize, const NODES: usize> {
     pub(crate) fault: Option<PlanError>,
     pub(crate) setpoint: Setpoint,
     pub(crate) work: Work,
+    /// The last move was released because the machine had to brake for want of the next.
+    pub(crate) starved: bool,
     moves: u32,
     end: Vector,
 }
@@ -188,8 +200,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 feed_use: 0.0,
                 span: Span::default(),
                 state: State::Idle,
+                starved: false,
             },
             work: Work::default(),
+            starved: false,
             moves: 0,
             end: start.to_array(),
         })
@@ -246,6 +260,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             let pose = Pose::from_array(next.geometry.at(0.0).position);
             return Err(PushError::Plan(PlanError { kind: PlanErrorKind::NoFeed, span: next.span, pose }));
         }
+        self.work.starved += u64::from(core::mem::take(&mut self.starved));
         let from = self.join(&next);
         self.end = next.geometry.at(length).position;
         self.append(Piece {
@@ -295,6 +310,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// Nothing follows for now: the last move is released to its end, where the machine comes to rest.
     pub fn finish(&mut self) {
+        self.starved = false;
+        self.release();
+    }
+
+    pub(crate) fn release(&mut self) {
         if let Some(last) = self.pieces.back_mut()
             && last.open
         {
@@ -389,6 +409,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.grid.piece = self.first_piece;
         self.executor.rest();
         self.fault = None;
+        self.starved = false;
         self.end = self.setpoint.pose.to_array();
     }
 

@@ -5,5 +5,6 @@ mod bad_input;
 mod cases;
 mod catalogue;
 mod harness;
+mod operator;
 mod random;
 mod runtime;
