@@ -122,6 +122,7 @@ fn minus(a: Work, b: Work) -> Work {
         samples: a.samples - b.samples,
         planned: a.planned - b.planned,
         passed: a.passed - b.passed,
+        starved: a.starved - b.starved,
     }
 }
 
