@@ -4,4 +4,5 @@
 //! [`workspace`] says what a machine can reach, from the same kinematics that moves it.
 
 pub mod checker;
+pub mod outcome;
 pub mod workspace;

@@ -18,11 +18,15 @@ fn main() -> Result<(), Box<dyn Error>> {
         driver_minimum: driver,
         range: JointRange { min: -50.0, max: 50.0 },
         start,
+        max_acceleration: f64::INFINITY,
+        following_error: 0.0,
+        switches: None,
     };
     let mut simulation = Simulation::new(&SimulationConfig {
         joints: vec![joint("x", 10.0), joint("y", 0.0)],
         axes: AxisSet::new(&[Axis::X, Axis::Y]),
         start: Pose { x: 10.0, ..Pose::ZERO },
+        homed: true,
         servo_period_ns: 1_000_000,
         timer_period_ns: 1000,
         spindle: None,

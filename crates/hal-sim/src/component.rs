@@ -1,5 +1,6 @@
 //! What a component is, what it sees of a period, and how it refuses.
 
+use crate::components::motion::Operator;
 use crate::components::spindle::SpindleCommand;
 use crate::values::Values;
 use pkm_kins::{Joints, Pose};
@@ -45,6 +46,8 @@ pub struct Feedback {
     pub spindle: SpindleFeedback,
     /// `motion.probe-input`
     pub probe: bool,
+    /// What the operator asks for.
+    pub operator: Operator,
 }
 
 /// Where setpoints come from: a planner, a table, a test.
@@ -142,6 +145,31 @@ pub enum Fault {
         /// mm or degrees
         limit: f64,
     },
+    /// A joint was commanded to change its speed faster than its motor may.
+    Acceleration {
+        /// Servo period.
+        tick: u64,
+        /// The pin.
+        pin: PinName,
+        /// mm/s² or degrees/s²
+        value: f64,
+        /// mm/s² or degrees/s²
+        limit: f64,
+    },
+    /// A drive says that it has failed.
+    AmplifierFault {
+        /// Servo period.
+        tick: u64,
+        /// The pin.
+        pin: PinName,
+    },
+    /// No setpoint came for too many servo periods in a row.
+    MissedPeriods {
+        /// Servo period.
+        tick: u64,
+        /// How many.
+        periods: u32,
+    },
     /// A limit switch is on.
     LimitSwitch {
         /// Servo period.
@@ -165,6 +193,13 @@ pub enum Fault {
         /// Why.
         error: EdgeError,
     },
+}
+
+impl Fault {
+    /// Motion refused, and stops the machine itself.
+    pub const fn is_of_motion(&self) -> bool {
+        !matches!(self, Self::Steps { .. } | Self::Parameter { .. })
+    }
 }
 
 /// Name of a numbered pin, without allocation: `joint.0.pos-cmd`.
@@ -211,6 +246,13 @@ impl fmt::Display for Fault {
             }
             Self::FollowingError { tick, pin, value, limit } => {
                 write!(f, "{pin} is {value} at tick {tick}, the limit is {limit}")
+            }
+            Self::Acceleration { tick, pin, value, limit } => {
+                write!(f, "{pin} asks for an acceleration of {value} at tick {tick}, the limit is {limit}")
+            }
+            Self::AmplifierFault { tick, pin } => write!(f, "{pin} is on at tick {tick}: a drive has failed"),
+            Self::MissedPeriods { tick, periods } => {
+                write!(f, "no setpoint came for {periods} servo periods up to tick {tick}")
             }
             Self::LimitSwitch { tick, pin } => write!(f, "{pin} is on at tick {tick}"),
             Self::Parameter { tick, pin } => write!(f, "{pin} cannot be used as it is set, at tick {tick}"),

@@ -189,6 +189,16 @@ impl Faults {
         self.0.iter().any(|fault| fault.original.is_some())
     }
 
+    /// Gives all pins back to their signals.
+    pub(crate) fn clear(&mut self, values: &mut Values) {
+        // the last that began points to the cell of the one before
+        for fault in self.0.drain(..).rev() {
+            if let Some(original) = fault.original {
+                values.pin_cells_mut(fault.pin_type)[fault.index] = original;
+            }
+        }
+    }
+
     /// Lets the faulty pins show what they make of their signals.
     pub(crate) fn show(&self, values: &mut Values) {
         for fault in &self.0 {

@@ -223,6 +223,19 @@ impl Hal {
         self.components.get(index).map(AsRef::as_ref)
     }
 
+    /// Works on a component by its place, with the values; nothing happens if it is of another type.
+    pub(crate) fn with_component<T: Component>(
+        &mut self,
+        index: usize,
+        work: impl FnOnce(&mut T, &mut Values),
+    ) {
+        let component = self.components.get_mut(index);
+        let component = component.and_then(|component| (component.as_mut() as &mut dyn Any).downcast_mut());
+        if let Some(component) = component {
+            work(component, &mut self.values);
+        }
+    }
+
     /// The first component of a type, e.g. the sampler, to take its rows.
     pub fn component_mut<T: Component>(&mut self) -> Option<&mut T> {
         self.components.iter_mut().find_map(|component| {
@@ -263,6 +276,11 @@ impl Hal {
     }
 
     // ---- faults
+
+    /// Takes all faults away.
+    pub fn clear_faults(&mut self) {
+        self.faults.clear(&mut self.values);
+    }
 
     /// Puts a fault on an input pin. Ticks are periods of the first thread, counted from 1; a fault whose time has come
     /// already begins with the next period.

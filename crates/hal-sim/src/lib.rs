@@ -22,9 +22,11 @@ pub mod component;
 pub mod components;
 mod config;
 pub mod faults;
+mod free;
 pub mod hal;
 mod hal_error;
 pub mod hal_file;
+pub mod homing;
 pub mod modules;
 mod pins;
 mod report;
@@ -38,11 +40,14 @@ pub use component::{
     Component, Fault, Feedback, PinIndex, PinName, Setpoint, SetpointSource, SpindleFeedback, Tick,
 };
 pub use components::driver::Violations;
+pub use components::motion::Operator;
 pub use components::spindle::{Orient, SpindleCommand, SpindleConfig, SpindleModel};
-pub use config::{ConfigError, JointConfig, SimulationConfig};
+pub use config::{ConfigError, JointConfig, SimulationConfig, Switches};
 pub use faults::{FaultKind, FaultTextError, PinFault};
+pub use free::Free;
 pub use hal::{Hal, MAX_NAME, Role};
 pub use hal_error::HalError;
+pub use homing::{HomeJoint, Homing, HomingConfig, HomingError};
 pub use pkm_stepgen::{Edge, Line, PulseTimingNs};
 pub use report::{JointState, JointStatistics, Observer, TickReport};
 pub use simulation::{Simulation, TickError};

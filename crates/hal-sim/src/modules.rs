@@ -292,6 +292,9 @@ fn motmod(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {
         start: 0.0,
         step: 1e-9,
         max_steps: 1 << 40,
+        max_acceleration: f64::INFINITY,
+        following_error: 0.0,
+        homed: true,
     };
     Ok(Motion::load(hal, &vec![joint; joints], AxisSet::new(&Axis::ALL))?)
 }

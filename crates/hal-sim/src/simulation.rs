@@ -10,12 +10,14 @@ use crate::components::motor::{MotorChannel, Motors};
 use crate::components::spindle::Spindle;
 use crate::components::stepgen::{Stepgen, StepgenChannel, StepgenError};
 use crate::config::{
-    ConfigError, JointConfig, SimulationConfig, THREAD, shown_scale, wire, wire_spindle_and_probe,
+    ConfigError, JointConfig, SimulationConfig, THREAD, shown_scale, wire, wire_all_switches,
+    wire_spindle_and_probe,
 };
 use crate::hal::Hal;
 use crate::hal_error::HalError;
+use crate::homing::{HomeCommand, HomeInput, Homing, HomingError};
 use crate::report::{JointState, JointStatistics, Observer, TickReport};
-use crate::values::{BitPin, FloatPin};
+use crate::values::{BitPin, FloatPin, Value};
 use pkm_kins::maths::radians;
 use pkm_kins::{AxisSet, ForwardError, JointKind, Joints, Kinematics, MAX_JOINTS, Pose};
 use pkm_stepgen::{Edge, Line, Period, PulseTiming, StepGenerator, StepType};
@@ -53,9 +55,19 @@ struct Lines {
     kind: JointKind,
     steps_per_unit: f64,
     motor_position: FloatPin,
+    home_switch: BitPin,
+    home_cursor: u64,
+    home_on: bool,
+    index: BitPin,
+    index_cursor: u64,
+    /// Where the joint is when its motor stands at 0, mm or rad: what only the simulation knows.
+    origin: f64,
+    /// Motor position less joint position, as homing found it, mm or rad.
+    offset: f64,
 }
 
 /// Places of the components in the HAL, in order of loading.
+const MOTION: usize = 0;
 const STEPGEN: usize = 1;
 const DRIVER: usize = 2;
 const SPINDLE: usize = 4;
@@ -96,20 +108,26 @@ impl Simulation {
 
         let mut setpoint = Setpoint { pose: config.start, in_position: true, ..Setpoint::default() };
         let (mut motion, mut stepgen, mut drivers, mut motors) = (vec![], vec![], vec![], vec![]);
+        let mut origins = vec![];
         for (n, joint) in config.joints.iter().enumerate() {
-            setpoint.joints[n] = joint.start;
+            let (origin, start) = if config.homed { (0.0, joint.start) } else { (joint.start, 0.0) };
+            origins.push(origin);
+            setpoint.joints[n] = start;
             let ticks = joint.timing.ticks(config.timer_period_ns).map_err(HalError::from)?;
-            let at_start = StepGenerator::new(n as u8, joint.steps_per_unit, ticks, joint.start)
+            let at_start = StepGenerator::new(n as u8, joint.steps_per_unit, ticks, start)
                 .map_err(|error| ConfigError::Joint { joint: n, error })?;
             motion.push(MotionJoint {
                 kind: joint.kind,
                 range: joint.range,
-                start: joint.start,
+                start,
                 step: 1.0 / joint.steps_per_unit,
                 max_steps: ticks.max_steps(&period),
+                max_acceleration: joint.max_acceleration,
+                following_error: joint.following_error,
+                homed: config.homed,
             });
             let scale = shown_scale(joint.kind, joint.steps_per_unit);
-            let start = joint.start * (joint.steps_per_unit / scale);
+            let start = start * (joint.steps_per_unit / scale);
             stepgen.push(StepgenChannel {
                 position_scale: scale,
                 timing: joint.timing,
@@ -130,9 +148,10 @@ impl Simulation {
         Motors::load(&mut hal, &motors)?;
         wire(&mut hal, count)?;
         wire_spindle_and_probe(&mut hal, config)?;
+        wire_all_switches(&mut hal, &config.joints, &origins)?;
 
         let mut simulation = Self {
-            lines: lines(&hal, config)?,
+            lines: lines(&hal, config, &origins)?,
             enable: hal.bit_pin("motion.enable")?,
             probe_input: hal.bit_pin("motion.probe-input")?,
             has_spindle: config.spindle.is_some(),
@@ -178,32 +197,34 @@ impl Simulation {
     /// Runs one servo period to a given setpoint.
     ///
     /// # Errors
-    /// The fault of a component. The period has run, and the machine is stopped as by [`Self::emergency_stop`]: what
-    /// motion refuses switches the drives off in this same period, what a step generator refuses in the next.
+    /// The fault of a component. The period has run. The machine stops: as [`crate::components::motion`] says for its own
+    /// faults, as by [`Self::emergency_stop`] for those of others. Drive it with [`Self::idle`] until [`Self::drives_on`] is false.
     pub fn tick_to(
         &mut self,
         setpoint: &Setpoint,
         observers: &mut [&mut dyn Observer],
     ) -> Result<TickReport<'_>, Fault> {
-        match self.hal.run(Some(setpoint)) {
-            Ok(()) => self.setpoint = *setpoint,
-            Err(fault) => {
-                self.stop_after(observers);
-                return Err(fault);
-            }
-        }
-        Ok(self.conclude(observers))
+        let result = self.hal.run(Some(setpoint));
+        self.setpoint = *setpoint;
+        self.end(result, observers)
     }
 
     /// Emergency stop (category 0): from the next period on the drives are off and no step begins. The simulation must
     /// then be driven with [`Self::idle`]; [`Self::reset`] ends it.
     pub fn emergency_stop(&mut self) {
-        self.hal.values_mut().set_bit(self.enable, false);
+        self.enable(false);
+    }
+
+    /// Sets the pin itself, whatever fault stands before its reader.
+    fn enable(&mut self, on: bool) {
+        if self.hal.setp("motion.enable", Value::Bit(on)).is_err() {
+            self.hal.values_mut().set_bit(self.enable, on);
+        }
     }
 
     /// Ends the emergency stop. The machine stands where the steps stand: [`Self::feedback`]; setpoints start there.
     pub fn reset(&mut self) {
-        self.hal.values_mut().set_bit(self.enable, true);
+        self.enable(true);
     }
 
     /// Runs one servo period without a setpoint: after an emergency stop, or at rest.
@@ -211,22 +232,44 @@ impl Simulation {
     /// # Errors
     /// The fault of a component, as in [`Self::tick_to`].
     pub fn idle(&mut self, observers: &mut [&mut dyn Observer]) -> Result<TickReport<'_>, Fault> {
-        if let Err(fault) = self.hal.run(None) {
-            self.stop_after(observers);
-            return Err(fault);
-        }
-        self.setpoint.velocities = [0.0; MAX_JOINTS];
-        if !self.hal.values().bit(self.enable) {
-            self.stands();
-        }
-        Ok(self.conclude(observers))
+        let result = self.hal.run(None);
+        self.end(result, observers)
     }
 
-    /// The period of a fault comes to its end.
-    fn stop_after(&mut self, observers: &mut [&mut dyn Observer]) {
-        self.emergency_stop();
-        self.stands();
-        self.conclude(observers);
+    /// The period comes to its end.
+    fn end(
+        &mut self,
+        result: Result<(), Fault>,
+        observers: &mut [&mut dyn Observer],
+    ) -> Result<TickReport<'_>, Fault> {
+        if result.as_ref().is_err_and(|fault| !fault.is_of_motion()) || !self.drives_on() {
+            self.emergency_stop();
+        }
+        self.commanded();
+        let report = self.conclude(observers);
+        result.map(|()| report)
+    }
+
+    /// The drives were on in the last period. Once they are off, [`Self::reset`] must come first.
+    pub fn drives_on(&self) -> bool {
+        self.motion().drives_on()
+    }
+
+    /// The setpoint is what motion made of it.
+    fn commanded(&mut self) {
+        let period_s = self.period.seconds();
+        let motion = part::<Motion>(&self.hal, MOTION);
+        if !motion.drives_on() {
+            self.stands();
+            return;
+        }
+        for n in 0..self.lines.len() {
+            let asked = self.setpoint.joints[n];
+            self.setpoint.joints[n] = motion.commanded(n);
+            if asked != self.setpoint.joints[n] {
+                self.setpoint.velocities[n] = motion.travelled(n) / period_s;
+            }
+        }
     }
 
     /// The command is where the steps stand.
@@ -234,7 +277,78 @@ impl Simulation {
         self.setpoint.velocities = [0.0; MAX_JOINTS];
         self.setpoint.in_position = false;
         for (n, generator) in part::<Stepgen>(&self.hal, STEPGEN).generators().enumerate() {
-            self.setpoint.joints[n] = generator.count() as f64 / self.lines[n].steps_per_unit;
+            let line = &self.lines[n];
+            self.setpoint.joints[n] = generator.count() as f64 / line.steps_per_unit - line.offset;
+        }
+    }
+
+    /// Runs one servo period of homing.
+    ///
+    /// # Errors
+    /// `Source`: homing failed, all joints stand. `Fault`: as in [`Self::tick_to`].
+    pub fn home(
+        &mut self,
+        homing: &mut Homing,
+        observers: &mut [&mut dyn Observer],
+    ) -> Result<TickReport<'_>, TickError<HomingError>> {
+        let mut inputs = [HomeInput::default(); MAX_JOINTS];
+        let mut commands = [HomeCommand::default(); MAX_JOINTS];
+        let count = self.lines.len();
+        self.home_inputs(&mut inputs);
+        homing.tick(&inputs[..count], &mut commands[..count]).map_err(TickError::Source)?;
+        let mut setpoint = Setpoint { line: 0, in_position: false, ..self.setpoint };
+        for (n, command) in commands[..count].iter().enumerate() {
+            if let Some(shift) = command.homed_by {
+                self.set_home(n, shift, true);
+            }
+            setpoint.joints[n] = command.position;
+            setpoint.velocities[n] = command.travel / self.period.seconds();
+        }
+        self.tick_to(&setpoint, observers).map_err(TickError::Fault)
+    }
+
+    /// What the home switches showed in the last period.
+    fn home_inputs(&mut self, inputs: &mut [HomeInput]) {
+        let start = self.period.start().saturating_sub(u64::from(self.period.ticks()));
+        let stepgen = part::<Stepgen>(&self.hal, STEPGEN);
+        for ((line, generator), input) in self.lines.iter_mut().zip(stepgen.generators()).zip(inputs) {
+            let values = self.hal.values();
+            let edges = values.edges(line.home_switch);
+            let edges = edges.read(&mut line.home_cursor, self.period.start());
+            let pulses = values.edges(line.index);
+            let pulses = pulses.read(&mut line.index_cursor, self.period.start());
+            let cubic = generator.cubic();
+            let at = |time: u64| {
+                let part = time.saturating_sub(start) as f64 / f64::from(self.period.ticks());
+                (cubic.base as f64 + cubic.at(part)) / line.steps_per_unit - line.offset
+            };
+            let rises = edges.iter().find(|edge| edge.level);
+            let on = values.bit(line.home_switch);
+            *input = HomeInput {
+                on,
+                was_on: on || line.home_on || rises.is_some(),
+                made_at: rises.filter(|_| !line.home_on).map(|edge| at(edge.time)),
+                index_at: pulses.iter().find(|edge| edge.level).map(|edge| at(edge.time)),
+            };
+            line.home_on = on;
+        }
+    }
+
+    /// The joint's zero is from now on where `shift` (mm or rad) was; nothing moves.
+    fn set_home(&mut self, n: usize, shift: f64, homed: bool) {
+        self.hal.with_component(MOTION, |motion: &mut Motion, values| {
+            motion.set_home(values, n, shift, homed);
+        });
+        self.lines[n].offset += shift;
+        self.setpoint.joints[n] -= shift;
+        self.states[n].position -= shift;
+        self.states[n].commanded -= shift;
+    }
+
+    /// Forgets where the joints are, as after a loss of power: their coordinates stay until they are homed.
+    pub fn forget_home(&mut self) {
+        for n in 0..self.lines.len() {
+            self.set_home(n, 0.0, false);
         }
     }
 
@@ -300,7 +414,7 @@ impl Simulation {
                 }
             }
             state.commanded = setpoint.joints[n];
-            state.position = state.count as f64 / line.steps_per_unit;
+            state.position = state.count as f64 / line.steps_per_unit - line.offset;
             state.step_error = -generator.offset(state.count);
             statistics.max_step_error = statistics.max_step_error.max(state.step_error.abs());
             statistics.min_position = statistics.min_position.min(state.position);
@@ -353,16 +467,23 @@ impl Simulation {
         joints
     }
 
+    /// Where the motors really hold the joints, mm or rad, whatever is known of it.
+    pub fn true_joints(&self) -> Joints {
+        let mut joints = [0.0; MAX_JOINTS];
+        for (joint, line) in joints.iter_mut().zip(&self.lines) {
+            let position = self.hal.values().float(line.motor_position);
+            let position = if line.kind == JointKind::Rotary { radians(position) } else { position };
+            *joint = position + line.origin;
+        }
+        joints
+    }
+
     /// The pose at which the motors hold the mechanism.
     ///
     /// # Errors
     /// The mechanism's own, if the motors stand where it cannot be.
     pub fn feedback_pose(&self, kinematics: &(impl Kinematics + ?Sized)) -> Result<Pose, ForwardError> {
-        let mut joints = [0.0; MAX_JOINTS];
-        for (joint, line) in joints.iter_mut().zip(&self.lines) {
-            let position = self.hal.values().float(line.motor_position);
-            *joint = if line.kind == JointKind::Rotary { radians(position) } else { position };
-        }
+        let joints = self.true_joints();
         kinematics.forward(&joints, &self.setpoint.pose)
     }
 
@@ -372,7 +493,8 @@ impl Simulation {
             true => part::<Spindle>(&self.hal, SPINDLE).feedback(),
             false => Default::default(),
         };
-        Feedback { spindle, probe: self.hal.values().bit(self.probe_input) }
+        let operator = self.motion().operator();
+        Feedback { spindle, probe: self.hal.values().bit(self.probe_input), operator }
     }
 
     /// True if the machine has a spindle.
@@ -393,6 +515,24 @@ impl Simulation {
                 ..*statistics
             })
             .collect()
+    }
+
+    fn motion(&self) -> &Motion {
+        part::<Motion>(&self.hal, MOTION)
+    }
+
+    /// Motor positions at which the joints are at 0, as homing found them, mm or rad.
+    pub fn home_offsets(&self) -> Joints {
+        let mut offsets = [0.0; MAX_JOINTS];
+        for (offset, line) in offsets.iter_mut().zip(&self.lines) {
+            *offset = line.offset;
+        }
+        offsets
+    }
+
+    /// Every joint knows where it is.
+    pub fn is_homed(&self) -> bool {
+        self.motion().is_homed()
     }
 
     fn generators(&self) -> impl Iterator<Item = &StepGenerator> {
@@ -449,8 +589,8 @@ fn edge(joint: usize, line: Line, edge: &crate::values::LineEdge) -> Edge {
     Edge { time: edge.time, joint: joint as u8, line, level: edge.level }
 }
 
-fn lines(hal: &Hal, config: &SimulationConfig) -> Result<Vec<Lines>, HalError> {
-    let line = |(n, joint): (usize, &JointConfig)| {
+fn lines(hal: &Hal, config: &SimulationConfig, origins: &[f64]) -> Result<Vec<Lines>, HalError> {
+    let line = |(n, (joint, origin)): (usize, (&JointConfig, &f64))| {
         Ok(Lines {
             step: hal.bit_pin(&format!("stepgen.{n}.step"))?,
             dir: hal.bit_pin(&format!("stepgen.{n}.dir"))?,
@@ -460,7 +600,14 @@ fn lines(hal: &Hal, config: &SimulationConfig) -> Result<Vec<Lines>, HalError> {
             kind: joint.kind,
             steps_per_unit: joint.steps_per_unit,
             motor_position: hal.float_pin(&format!("motor.{n}.position"))?,
+            home_switch: hal.bit_pin(&format!("joint.{n}.home-sw-in"))?,
+            home_cursor: 0,
+            home_on: false,
+            index: hal.bit_pin(&format!("joint.{n}.index-in"))?,
+            index_cursor: 0,
+            origin: *origin,
+            offset: 0.0,
         })
     };
-    config.joints.iter().enumerate().map(line).collect()
+    config.joints.iter().zip(origins).enumerate().map(line).collect()
 }

@@ -53,6 +53,9 @@ pub struct Tables {
     /// `[singularity]`
     #[serde(default)]
     pub singularity: Singularity,
+    /// `[homing]`
+    #[serde(default)]
+    pub homing: Homing,
     /// `[driver]`: for every joint that has none of its own.
     pub driver: Option<Spanned<Driver>>,
     /// `[[joint]]`, in joint order.
@@ -156,6 +159,41 @@ pub struct Joint {
     pub max_acceleration_deg_s2: Option<Number>,
     pub steps_per_deg: Option<Number>,
     pub driver: Option<Spanned<Driver>>,
+    /// Largest difference of command and feedback; 3 steps if absent.
+    pub following_error_mm: Option<Number>,
+    pub following_error_deg: Option<Number>,
+    pub home: Option<Spanned<JointHome>>,
+}
+
+/// A joint's `home`: see [`crate::JointHoming`]. All keys optional; `_deg` for a rotary joint.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct JointHome {
+    /// At the home pose if absent.
+    pub switch_mm: Option<Number>,
+    /// With sign; a fifth of the joint's velocity, downwards, if absent.
+    pub search_velocity_mm_s: Option<Number>,
+    /// A tenth of the search if absent.
+    pub latch_velocity_mm_s: Option<Number>,
+    /// Use the index of the encoder.
+    pub index_pitch_mm: Option<Number>,
+    pub switch_deg: Option<Number>,
+    pub search_velocity_deg_s: Option<Number>,
+    pub latch_velocity_deg_s: Option<Number>,
+    pub index_pitch_deg: Option<Number>,
+    /// 0 if absent.
+    pub sequence: Option<Spanned<i64>>,
+}
+
+/// `[homing]`
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Homing {
+    /// How long a contact must have been off to count as off; 25 if absent.
+    pub debounce_ms: Option<Number>,
+    /// How long the simulated contacts bounce; 2 if absent.
+    pub switch_bounce_ms: Option<Number>,
 }
 
 /// `[axis.*]`

@@ -3,6 +3,7 @@
 use crate::checks::{identifier, integer, positive, range};
 use crate::drivers::DriverTiming;
 use crate::file::{self, Nanoseconds, Number};
+use crate::homing;
 use crate::machine::Joint;
 use crate::source::Findings;
 use pkm_kins::machine::Mechanism;
@@ -10,6 +11,9 @@ use pkm_kins::{JointKind, Kinematics, maths};
 use pkm_stepgen::{PulseTimingNs, drivers};
 use std::ops::{Range, RangeInclusive};
 use toml::Spanned;
+
+/// Following error of a joint that states none, steps: half a step of rounding, one step late, one of noise.
+const FOLLOWING_ERROR_STEPS: f64 = 3.0;
 
 const DRIVER_TIME_NS: RangeInclusive<i64> = 1..=1_000_000_000;
 
@@ -127,10 +131,27 @@ fn build_joint(
         (JointKind::Rotary, false) => maths::radians(value),
         (JointKind::Rotary, true) => maths::degrees(value),
     };
+    let fields = [
+        ("following_error_mm", &joint.following_error_mm, JointKind::Linear),
+        ("following_error_deg", &joint.following_error_deg, JointKind::Rotary),
+    ];
+    let mut following_error = None;
+    for (key, number, of) in fields {
+        let Some(number) = number else { continue };
+        if of != kind {
+            let message = format!("{label}`{key}`, but the joint is {what}");
+            findings.error("machine-unit", number.span(), message, "use the key of the other unit");
+        }
+        following_error = Some(positive(&format!("{label}{key}"), number, findings)?);
+    }
+    let home = joint.home.as_ref().map(Spanned::get_ref);
+    let homing = homing::joint(&label, home, kind, range?, face(max_velocity?, false), findings);
     Some(Joint {
         name: name?,
         kind,
         range: range?,
+        following_error: face(following_error.unwrap_or(FOLLOWING_ERROR_STEPS / steps_per_unit?), false),
+        homing: homing?,
         max_velocity: face(max_velocity?, false),
         max_acceleration: face(max_acceleration?, false),
         steps_per_unit: face(steps_per_unit?, true),

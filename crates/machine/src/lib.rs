@@ -14,6 +14,7 @@
 mod checks;
 pub mod drivers;
 pub mod file;
+mod homing;
 mod joint;
 pub mod kinematics;
 mod load;
@@ -26,6 +27,7 @@ mod switch;
 
 pub use drivers::DriverTiming;
 pub use file::MachineFile;
+pub use homing::{Homing, JointHoming};
 pub use load::read;
 pub use machine::{AxisLimits, Joint, Machine, PathSettings, SingularityGuard};
 pub use refusal::Refusal;

@@ -3,6 +3,7 @@
 use crate::checks::{finite, identifier, integer, not_negative, positive, range};
 use crate::drivers::DriverTiming;
 use crate::file::{self, MachineFile, Number};
+use crate::homing::{self, Homing, JointHoming};
 use crate::joint::joints;
 use crate::source::Findings;
 use crate::switch::{Switch, switches};
@@ -29,6 +30,8 @@ pub struct Machine {
     pub joints: Vec<Joint>,
     /// Limits of the axes that have any, in letter order.
     pub axes: Vec<AxisLimits>,
+    /// How the machine finds its zero.
+    pub homing: Homing,
     /// Where the machine stands at the start: reachable, inside the travel, away from singularities.
     pub home: Pose,
     /// Servo period.
@@ -56,6 +59,10 @@ pub struct Joint {
     pub max_velocity: f64,
     /// mm/s² or rad/s²
     pub max_acceleration: f64,
+    /// Largest difference of command and feedback, mm or rad, above 0.
+    pub following_error: f64,
+    /// How it finds its zero.
+    pub homing: JointHoming,
     /// Steps per mm or rad, above 0.
     pub steps_per_unit: f64,
     /// As configured; never shorter than the driver's minima.
@@ -171,12 +178,18 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
     let path = path(tables, servo_period_ns.unwrap_or(1_000_000), findings);
     let singularity = singularity(tables, findings);
     let mechanism = file.kinematics.get_ref().build(file.kinematics.span(), findings);
-    let joints =
+    let mut joints =
         mechanism.as_ref().and_then(|mechanism| joints(tables, mechanism, timer_period_ns?, findings));
     let axes = mechanism.as_ref().map(|mechanism| axes(tables, mechanism, findings));
     let home = mechanism.as_ref().and_then(|mechanism| {
         home(tables, mechanism, joints.as_deref()?, axes.as_deref()?, singularity?, findings)
     });
+    let homing = homing::common(tables, findings);
+    if let (Some(mechanism), Some(joints), Some(home), Some(singularity)) =
+        (&mechanism, &mut joints, &home, singularity)
+    {
+        homing::check(tables, mechanism, joints, home, singularity, findings);
+    }
     let switches = mechanism.as_ref().and_then(|mechanism| switches(tables, mechanism, findings));
     Some(Machine {
         name: name?,
@@ -186,6 +199,7 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
         mechanism: mechanism?,
         joints: joints?,
         axes: axes?,
+        homing: homing?,
         home: home?,
         servo_period_ns: servo_period_ns?,
         timer_period_ns: timer_period_ns?,

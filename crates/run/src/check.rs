@@ -79,7 +79,7 @@ pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<
 
 /// Interprets the program and looks at every move.
 fn interpret(program: &Program, machine: &Machine, options: &Options) -> Result<Checked, Diagnostic> {
-    let start = options.start.unwrap_or(machine.home);
+    let start = options.program_start(machine);
     let mut checked = Checked::default();
     let mut mechanism = machine.mechanism;
     let at_start = mechanism.inverse(&start).map_err(PlanErrorKind::Unreachable);

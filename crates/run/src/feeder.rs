@@ -9,7 +9,7 @@ use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::{Canon, CanonSink, Span};
 use pkm_gcode::{Interpreter, LineSource, MachineCodes, Parameters, Settings, Status};
-use pkm_hal_sim::{Setpoint, SetpointSource};
+use pkm_hal_sim::{Feedback, Operator, Setpoint, SetpointSource};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Joints, Kinematics, Pose, maths};
 use pkm_machine::{Machine, Switched};
@@ -123,8 +123,12 @@ pub(crate) struct Feeder<'a> {
     merger: Merger,
     /// Moves that have left the merger, with the chords they stand for.
     merged: VecDeque<(Move, Chords)>,
-    start: Pose,
     program_ended: bool,
+    /// The operator's override, before what the machine adapts.
+    feed_override: f64,
+    /// The planner runs twice in this period.
+    doubled: bool,
+    aborted: bool,
     failure: Option<Diagnostic>,
     pub(crate) programmed: Programmed,
     pub(crate) blocks: u64,
@@ -137,7 +141,7 @@ impl<'a> Feeder<'a> {
         machine: &'a Machine,
         options: &Options,
     ) -> Result<Self, Diagnostic> {
-        let start = options.start.unwrap_or(machine.home);
+        let start = options.program_start(machine);
         let joints: Vec<JointLimits> = machine
             .joints
             .iter()
@@ -194,17 +198,15 @@ impl<'a> Feeder<'a> {
             queue: VecDeque::new(),
             merger: Merger::default(),
             merged: VecDeque::new(),
-            start,
             program_ended: false,
+            feed_override: options.feed_override,
+            doubled: false,
+            aborted: false,
             failure: None,
             programmed: Programmed::default(),
             blocks: 0,
             path_length_mm: 0.0,
         })
-    }
-
-    pub(crate) fn start(&self) -> Pose {
-        self.start
     }
 
     /// Everything driven and at rest.
@@ -283,6 +285,18 @@ impl<'a> Feeder<'a> {
             } else {
                 self.step();
             }
+        }
+    }
+
+    /// What the operator asks for, every period.
+    fn operator(&mut self, operator: &Operator) {
+        self.doubled = operator.doubled;
+        self.planner.hold(operator.feed_hold);
+        self.planner.set_feed_override(self.feed_override * operator.adaptive_feed);
+        if operator.abort && !self.aborted {
+            self.aborted = true;
+            self.fail(messages::aborted(self.program, self.line()));
+            self.planner.abort();
         }
     }
 
@@ -408,7 +422,15 @@ impl<'a> Feeder<'a> {
 impl SetpointSource for Feeder<'_> {
     type Error = FeederError;
 
+    fn feedback(&mut self, feedback: &Feedback) {
+        self.operator(&feedback.operator);
+    }
+
     fn next(&mut self, _tick: u64) -> Result<Setpoint, FeederError> {
+        if self.doubled {
+            self.fill();
+            self.planned().map_err(|failure| FeederError(Box::new(failure)))?;
+        }
         self.fill();
         let mut setpoint = self.planned().map_err(|failure| FeederError(Box::new(failure)))?;
         if let Some(fault) = self.planner.fault().copied() {

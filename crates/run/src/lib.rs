@@ -5,24 +5,29 @@
 //! simulated HAL and judges the edges. Memory does not grow with the length of the program.
 
 mod check;
+mod controller;
 mod deviation;
 mod feeder;
 mod messages;
 mod plan;
 mod program;
+mod rehearsal;
 mod summary;
 mod switch;
+mod wiring;
 
 pub use check::{Checked, check};
+pub use pkm_analysis::outcome::{Objection, Outcome};
 pub use plan::{BlockPlan, Plan, Shares, plan};
 pub use program::Program;
+pub use rehearsal::{Played, Rehearsal};
 pub use summary::{ClosestApproach, JointSummary, SCHEMA, Summary};
 
-use feeder::{Feeder, FeederError};
+use controller::Controller;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_gcode::{Parameters, ToolTable};
-use pkm_hal_sim::{JointConfig, Observer, Simulation, SimulationConfig, TickError};
-use pkm_kins::{Kinematics, Pose};
+use pkm_hal_sim::{Observer, PinFault, Simulation};
+use pkm_kins::Pose;
 use pkm_machine::Machine;
 use std::ops::ControlFlow;
 use summary::Account;
@@ -42,6 +47,10 @@ pub struct Options {
     pub block_delete: bool,
     /// The tools of the machine; none without it. Read once for the life of the process.
     pub tools: Option<&'static ToolTable>,
+    /// The machine begins without knowing where it is, and homes first; the program begins at its home pose.
+    pub home: bool,
+    /// Faults on pins, in periods of the HAL.
+    pub faults: &'static [PinFault],
     /// What the parameters are when the program begins; a fresh set without it.
     pub parameters: Option<&'static Parameters>,
 }
@@ -55,8 +64,17 @@ impl Default for Options {
             max_ticks: 100_000_000,
             block_delete: false,
             tools: None,
+            home: false,
+            faults: &[],
             parameters: None,
         }
+    }
+}
+
+impl Options {
+    /// Where the program begins: homing leads to the home pose.
+    fn program_start(&self, machine: &Machine) -> Pose {
+        self.start.filter(|_| !self.home).unwrap_or(machine.home)
     }
 }
 
@@ -74,6 +92,18 @@ const PROGRESS_TICKS: u64 = 1000;
 
 /// The planner's queues are larger than the stack of a small thread.
 const STACK_BYTES: usize = 64 << 20;
+
+/// Does work that needs more stack than small threads have: the planner's queues are large.
+///
+/// # Panics
+/// As the work does, and if no thread can be started.
+pub fn on_a_large_stack<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    std::thread::scope(|scope| {
+        let worker = std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work);
+        let worker = worker.expect("a thread can be started");
+        worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
 
 /// Runs a program on the simulated machine. The whole program is checked first; if that finds an error, nothing moves
 /// and the summary says so (`completed: false`, with the findings).
@@ -112,72 +142,45 @@ fn drive<O: Observer>(
     outputs: impl FnOnce(&Simulation) -> O,
     mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
 ) -> Result<(Summary, Option<O>), Diagnostic> {
-    let substeps = u64::from(options.substeps.max(1));
-    let mut feeder = Feeder::new(program, machine, options)?;
-    let mut simulation = Simulation::new(&simulation_config(machine, feeder.start(), substeps))
-        .map_err(|e| messages::host(program, &e.to_string()))?;
-    let mut outputs = outputs(&simulation);
-    let mut account = Account::new(machine, &simulation);
+    let mut controller = Controller::new(program, machine, options, false)?;
+    let mut outputs = outputs(&controller.simulation);
+    let mut account = Account::new(machine, &controller.simulation);
     let mut findings = checked.diagnostics;
     let mut completed = false;
     let mut ticks = 0;
     loop {
-        if feeder.is_done() {
-            completed = feeder.failure().is_none();
-            findings.extend(feeder.failure().cloned());
+        if controller.is_done() {
+            completed = controller.feeder.failure().is_none();
+            findings.extend(controller.feeder.failure().cloned());
             break;
         }
         if ticks >= options.max_ticks {
-            findings.push(messages::max_ticks(program, options.max_ticks, feeder.line()));
+            findings.push(messages::max_ticks(program, options.max_ticks, controller.feeder.line()));
             break;
         }
-        if ticks % PROGRESS_TICKS == 0 && progress(&Progress { ticks, line: feeder.line() }).is_break() {
-            findings.push(messages::interrupted(program, feeder.line(), ticks));
+        if ticks % PROGRESS_TICKS == 0
+            && progress(&Progress { ticks, line: controller.feeder.line() }).is_break()
+        {
+            findings.push(messages::interrupted(program, controller.feeder.line(), ticks));
             break;
         }
         ticks += 1;
-        let mut fault = None;
-        for _ in 0..substeps {
-            if let Err(error) = simulation.tick(&mut feeder, &mut [&mut outputs]) {
-                fault = Some(match error {
-                    TickError::Source(FeederError(diagnostic)) => *diagnostic,
-                    TickError::Fault(fault) => messages::fault(program, feeder.line(), &fault),
-                });
-                break;
-            }
-        }
-        if let Some(fault) = fault {
-            findings.push(fault);
+        let homing = controller.is_homing();
+        if let Err(stop) = controller.period(&mut [&mut outputs]) {
+            controller.stop(&mut [&mut outputs]);
+            findings.push(stop);
             break;
         }
-        account.tick(&simulation, &mut feeder);
+        if homing {
+            account.homing(&controller.simulation);
+        } else {
+            account.tick(&controller.simulation, &mut controller.feeder);
+        }
     }
-    let mut summary = account.finish(program, machine, &simulation, &feeder);
+    let Controller { simulation, feeder, .. } = &controller;
+    let mut summary = account.finish(program, machine, simulation, feeder);
     summary.completed = completed && !findings.iter().any(|d| d.severity == Severity::Error);
     summary.diagnostics = findings;
     summary.parameters = summary.completed.then(|| Box::new(feeder.parameters().clone()));
     Ok((summary, Some(outputs)))
-}
-
-fn simulation_config(machine: &Machine, start: Pose, substeps: u64) -> SimulationConfig {
-    // The feeder has checked that the start pose has joints.
-    let at_start = machine.mechanism.inverse(&start).unwrap_or_default();
-    let joints = machine.joints.iter().zip(at_start).map(|(joint, start)| JointConfig {
-        name: joint.name.clone(),
-        kind: joint.kind,
-        steps_per_unit: joint.steps_per_unit,
-        timing: joint.timing,
-        driver_minimum: joint.driver.minimum,
-        range: joint.range,
-        start,
-    });
-    SimulationConfig {
-        joints: joints.collect(),
-        axes: machine.mechanism.axes(),
-        start,
-        servo_period_ns: machine.servo_period_ns / substeps,
-        timer_period_ns: machine.timer_period_ns,
-        spindle: None,
-        workpiece: Vec::new(),
-    }
 }

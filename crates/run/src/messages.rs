@@ -3,7 +3,7 @@
 use crate::program::Program;
 use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
-use pkm_hal_sim::Fault;
+use pkm_hal_sim::{Fault, HalError, HomingError, PinFault};
 use pkm_kins::{InverseError, Kinematics, Pose, maths};
 use pkm_machine::{Machine, Refusal, SwitchTarget};
 use pkm_planner::{PlanError, PlanErrorKind};
@@ -125,10 +125,68 @@ fn unit(kind: pkm_kins::JointKind) -> &'static str {
     }
 }
 
+/// The operator gave the program up.
+pub(crate) fn aborted(program: &Program, line: u32) -> Diagnostic {
+    let span = Span { line, ..Span::default() };
+    let message = format!("aborted in line {line}: the machine stands on the path");
+    at(program, span, "aborted", Severity::Error, message, "run the program again from its beginning")
+}
+
+/// Drives off from outside.
+pub(crate) fn emergency_stop(program: &Program, line: u32, tick: u64) -> Diagnostic {
+    let span = Span { line, ..Span::default() };
+    let message = format!(
+        "emergency stop in line {line} at tick {tick}: drives off, the machine stands where its steps stand"
+    );
+    at(
+        program,
+        span,
+        "emergency-stop",
+        Severity::Error,
+        message,
+        "release it, reset, home, and run the program again",
+    )
+}
+
+/// A joint found no zero.
+pub(crate) fn homing(program: &Program, error: &HomingError) -> Diagnostic {
+    at(
+        program,
+        Span::default(),
+        "homing",
+        Severity::Error,
+        error.to_string(),
+        "look at the switch and its wiring, then home again",
+    )
+}
+
+/// A fault for a pin that the machine does not have.
+pub(crate) fn no_such_pin(program: &Program, fault: &PinFault, error: &HalError) -> Diagnostic {
+    let message = format!("the fault {fault} cannot be: {error}");
+    at(
+        program,
+        Span::default(),
+        "fault-pin",
+        Severity::Error,
+        message,
+        "`pkm hal show --machine FILE pin` lists the pins; a fault needs one with direction IN",
+    )
+}
+
 /// A refusal of the simulated HAL.
 pub(crate) fn fault(program: &Program, line: u32, fault: &Fault) -> Diagnostic {
     let span = Span { line, ..Span::default() };
-    let help = "lower the joint's max velocity or steps per unit, or shorten the driver's times";
+    let help = match fault {
+        Fault::Jump { .. } | Fault::Steps { .. } => {
+            "lower the joint's max velocity or steps per unit, or shorten the driver's times"
+        }
+        Fault::FollowingError { .. } => {
+            "look for lost steps, a slipping encoder or a drive that is off; then home"
+        }
+        Fault::LimitSwitch { .. } => "reset, then move the joint off its switch: only that way is allowed",
+        Fault::AmplifierFault { .. } => "mend the drive, reset, home",
+        _ => "reset, home, and run the program again",
+    };
     at(program, span, "hal-fault", Severity::Error, fault.to_string(), help)
 }
 

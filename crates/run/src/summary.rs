@@ -177,6 +177,12 @@ impl<'a> Account<'a> {
         }
     }
 
+    /// A period of homing: it takes time, but is no path.
+    pub(crate) fn homing(&mut self, simulation: &Simulation) {
+        self.ticks += 1;
+        self.last = [simulation.report().setpoint.joints; 2];
+    }
+
     pub(crate) fn tick(&mut self, simulation: &Simulation, feeder: &mut Feeder<'_>) {
         self.ticks += 1;
         let setpoint = *feeder.setpoint();

@@ -147,10 +147,13 @@ impl Stepgen {
 
     fn update(&mut self, values: &mut Values, tick: &Tick<'_>) -> Result<(), Fault> {
         let (start, end) = (tick.period.start(), tick.period.end());
+        let mut refused = Ok(());
         for (n, (generator, pins)) in self.channels.iter_mut().enumerate() {
             let enabled = values.bit(pins.enable);
-            configure(generator, pins, values, self.timer_period_ns)
-                .map_err(|pin| Fault::Parameter { tick: tick.number, pin: parameter(n, pin) })?;
+            if let Err(pin) = configure(generator, pins, values, self.timer_period_ns) {
+                refused = refused.and(Err(Fault::Parameter { tick: tick.number, pin: parameter(n, pin) }));
+                continue;
+            }
             let lines = &pins.lines[..pins.step_type.lines()];
             let mut queues: [EdgeQueue; MAX_PHASES] = Default::default();
             for (queue, line) in queues.iter_mut().zip(lines) {
@@ -178,9 +181,11 @@ impl Stepgen {
             for (queue, line) in queues.iter_mut().zip(lines) {
                 values.put_edges(*line, std::mem::take(queue), end);
             }
-            result.map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error })?;
+            // the other channels go on: all of them stop together in the next period
+            let result = result.map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error });
+            refused = refused.and(result);
         }
-        Ok(())
+        refused
     }
 
     fn capture(&self, values: &mut Values) {

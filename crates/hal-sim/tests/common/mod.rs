@@ -19,11 +19,15 @@ pub fn config(joints: usize, timer_period_ns: u64) -> SimulationConfig {
         driver_minimum: minimum,
         range: JointRange { min: -1000.0, max: 1000.0 },
         start: wave(n, 0.0).0,
+        max_acceleration: f64::INFINITY,
+        following_error: 0.0,
+        switches: None,
     };
     SimulationConfig {
         joints: (0..joints).map(joint).collect(),
         axes: AxisSet::new(&[Axis::X, Axis::Y, Axis::B]),
         start: Pose::ZERO,
+        homed: true,
         servo_period_ns: SERVO_NS,
         timer_period_ns,
         spindle: None,
