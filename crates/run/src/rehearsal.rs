@@ -162,7 +162,7 @@ impl<'a> Rehearsal<'a> {
         };
         while !controller.is_done() && kept.rows.len() < MOST_PERIODS {
             let periods = kept.rows.len() - 1;
-            if periods % EVERY == 0 {
+            if periods.is_multiple_of(EVERY) {
                 kept.copies.push(Session {
                     simulation: controller.simulation.clone(),
                     homing: controller.homing().cloned(),

@@ -46,7 +46,7 @@ fn random_faults() {
     for (n, (name, text)) in CASES.iter().enumerate() {
         let (machine, program) = (machine(name), program(text));
         let rehearsal = Rehearsal::new(&program, &machine, &Options::default()).unwrap();
-        println!("{name}: {} periods", rehearsal.periods());
+        eprintln!("{name}: {} periods", rehearsal.periods());
         for seed in (first..first + count).filter(|seed| seed % 3 == n as u64) {
             let fault = rehearsal.random_fault(seed).to_string();
             match play(&rehearsal, &fault) {
@@ -55,7 +55,7 @@ fn random_faults() {
             }
         }
     }
-    println!("{outcomes:?}");
+    eprintln!("{outcomes:?}");
     assert!(bad.is_empty(), "{} of {count}:\n{}", bad.len(), bad[..bad.len().min(40)].join("\n"));
     assert!(outcomes.len() >= 3, "{outcomes:?}: the test does not test");
 }
