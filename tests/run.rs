@@ -412,3 +412,44 @@ fn parameters_reach_the_machine_and_are_saved_after_a_completed_program_only() {
         assert_eq!(refused.json()["diagnostics"][0]["code"], "param-file");
     }
 }
+
+#[test]
+fn the_step_stream_plays_the_steps_of_the_summary() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let program = shipped("moma-arcs.ngc");
+    let mut sizes = Vec::new();
+    for stream in ["--step-stream", "--step-stream=500"] {
+        let run = pkm(&[
+            "run",
+            &program,
+            "--machine",
+            "moma-a",
+            "--format",
+            "json",
+            "--no-trace",
+            "--out",
+            out,
+            stream,
+        ]);
+        assert_eq!(run.status, 0, "{}", run.stderr);
+        let summary = run.json();
+        let file = folder.path().join("steps.pkms");
+        let file = file.to_str().unwrap();
+        let played = pkm(&["steps", file, "--format", "json"]).json();
+        for (n, joint) in summary["joints"].as_array().unwrap().iter().enumerate() {
+            assert_eq!(played["joints"][n]["steps"], joint["steps"]);
+        }
+        let rows = pkm(&["steps", file, "--format", "csv"]).stdout;
+        let last = rows.lines().rfind(|row| row.split(',').nth(1) == Some("0")).unwrap();
+        assert_eq!(last.split(',').nth(3).unwrap(), played["joints"][0]["count"].to_string());
+        sizes.push(played["bytes"].as_u64().unwrap());
+    }
+    assert!(sizes[1] * 2 < sizes[0], "{sizes:?}");
+    let file = folder.path().join("steps.pkms");
+    let bytes = std::fs::read(&file).unwrap();
+    write(&file, &bytes[..bytes.len() / 2]);
+    let cut = pkm(&["steps", file.to_str().unwrap()]);
+    assert_eq!(cut.status, 2);
+    assert!(cut.stderr.contains("not a whole step stream"), "{}", cut.stderr);
+}

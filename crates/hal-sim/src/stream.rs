@@ -176,6 +176,20 @@ struct Playback {
     last: u64,
 }
 
+impl Playback {
+    /// Time, in timer ticks, and direction of the next step.
+    fn next(&mut self) -> Option<(u64, bool)> {
+        while let Some(run) = self.runs.get(self.run) {
+            if self.made < run.count {
+                return Some((run.time(self.last, self.made + 1), run.forward));
+            }
+            self.last = run.time(self.last, run.count);
+            (self.run, self.made) = (self.run + 1, 0);
+        }
+        None
+    }
+}
+
 fn damaged(what: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, format!("not a whole step stream: {what}"))
 }
@@ -210,23 +224,44 @@ impl StreamSteps {
         Ok(Self { timer_period_ns: u64::from_le_bytes(*timer), joints: players, counts: vec![0; joints] })
     }
 
+    /// The next step of any joint: its time, ns, its joint, and whether it goes forward. Of steps at one time the first joint's
+    /// comes first.
+    pub fn next_step(&mut self) -> Option<(u64, usize, bool)> {
+        let mut first: Option<(u64, usize, bool)> = None;
+        for (n, player) in self.joints.iter_mut().enumerate() {
+            if let Some((time, forward)) = player.next()
+                && first.is_none_or(|(earliest, ..)| time < earliest)
+            {
+                first = Some((time, n, forward));
+            }
+        }
+        let (time, joint, forward) = first?;
+        self.joints[joint].made += 1;
+        self.counts[joint] += if forward { 1 } else { -1 };
+        Some((time.saturating_mul(self.timer_period_ns), joint, forward))
+    }
+
     /// Counts all steps up to and including `time_ns`; the sums since time 0, in joint order. Times must not go back.
     pub fn counts_at(&mut self, time_ns: u64) -> &[i64] {
         for (player, count) in self.joints.iter_mut().zip(&mut self.counts) {
-            while let Some(run) = player.runs.get(player.run) {
-                if player.made == run.count {
-                    player.last = run.time(player.last, run.count);
-                    (player.run, player.made) = (player.run + 1, 0);
-                    continue;
-                }
-                let next = run.time(player.last, player.made + 1);
-                if next.saturating_mul(self.timer_period_ns) > time_ns {
+            while let Some((time, forward)) = player.next() {
+                if time.saturating_mul(self.timer_period_ns) > time_ns {
                     break;
                 }
                 player.made += 1;
-                *count += if run.forward { 1 } else { -1 };
+                *count += if forward { 1 } else { -1 };
             }
         }
+        &self.counts
+    }
+
+    /// Period of the timer that all times are multiples of, ns.
+    pub const fn timer_period_ns(&self) -> u64 {
+        self.timer_period_ns
+    }
+
+    /// Steps so far, forward less backward, in joint order.
+    pub fn counts(&self) -> &[i64] {
         &self.counts
     }
 

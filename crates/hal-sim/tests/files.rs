@@ -84,6 +84,16 @@ fn vcd_trace_and_stream_decode_to_the_same_positions() {
             assert_eq!(absolute(from_vcd.counts_at(time_ns).unwrap()), *expected, "tick {tick}");
             assert_eq!(absolute(from_stream.counts_at(time_ns)), *expected, "tick {tick}");
         }
+        // step by step: in order of time, to the same sums
+        let mut steps = StreamSteps::new(&stream).unwrap();
+        let (mut last, mut sums) = (0, vec![0; starts.len()]);
+        while let Some((time_ns, joint, forward)) = steps.next_step() {
+            assert!(time_ns >= last, "{time_ns} after {last}");
+            last = time_ns;
+            sums[joint] += if forward { 1 } else { -1 };
+        }
+        assert_eq!(sums, from_stream.counts());
+        assert_eq!(sums, steps.counts());
         assert!(stream.len() * 10 < vcd.len(), "{} {}", stream.len(), vcd.len());
         // a damaged stream is refused
         assert!(StreamSteps::new(&stream[..stream.len() - 1]).is_err());

@@ -50,6 +50,8 @@ pub(crate) enum Command {
     /// Pose to joints and back, JSON lines in and out
     #[command(subcommand)]
     Kins(Kins),
+    /// Play a compact step stream (steps.pkms): its steps as CSV, or its sums
+    Steps(Steps),
     /// List the machines that ship, or print one annotated machine file
     Machines(Machines),
     /// Write the man page or shell completions to standard output
@@ -66,7 +68,7 @@ impl Command {
             Self::Run(arguments) => &arguments.program.machine.set,
             Self::Check(arguments) => &arguments.program.machine.set,
             Self::Plan(arguments) => &arguments.program.machine.set,
-            Self::Canon(_) | Self::Machines(_) | Self::Generate(_) => &[],
+            Self::Canon(_) | Self::Steps(_) | Self::Machines(_) | Self::Generate(_) => &[],
         }
     }
 }
@@ -117,6 +119,9 @@ pub(crate) struct Run {
     /// Do not write trace.csv
     #[arg(long)]
     pub no_trace: bool,
+    /// Also write steps.pkms, a compact stream for a microcontroller's timer, into the folder; its steps may be NS nanoseconds off
+    #[arg(long, value_name = "NS", requires = "out", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
+    pub step_stream: Option<u64>,
     /// Rows of trace.csv per servo period
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub trace_substeps: u32,
@@ -253,6 +258,26 @@ pub(crate) struct KinsArgs {
     /// Ask for geometry alone: joint travel and other limits do not apply
     #[arg(long)]
     pub no_limits: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Steps {
+    /// The stream, as `pkm run --step-stream` writes it
+    pub stream: PathBuf,
+    /// How it is printed
+    #[arg(long, value_enum, default_value_t = StepsFormat::Text)]
+    pub format: StepsFormat,
+}
+
+/// How a step stream is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StepsFormat {
+    /// Its size and sums, for a person
+    Text,
+    /// The same for a script; carries "schema": 1
+    Json,
+    /// Every step: time_ns, joint (from 0), step (1 or -1), count since the start
+    Csv,
 }
 
 #[derive(Debug, Args)]

@@ -9,4 +9,5 @@ pub(crate) mod parameters;
 pub(crate) mod plan;
 pub(crate) mod program;
 pub(crate) mod run;
+pub(crate) mod steps;
 pub(crate) mod tool_table;

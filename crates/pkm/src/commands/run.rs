@@ -8,7 +8,7 @@ use crate::output::{Folder, Pending};
 use crate::render::diagnostics::Messages;
 use crate::render::summary;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use pkm_hal_sim::{Observer, Simulation, TickReport, TraceWriter, VcdWriter};
+use pkm_hal_sim::{Observer, Simulation, StreamWriter, TickReport, TraceWriter, VcdWriter};
 use pkm_run::{Options, Progress, Summary};
 use pkm_stepgen::Edge;
 use std::io::{IsTerminal, Write, stderr, stdout};
@@ -20,16 +20,20 @@ use std::sync::atomic::Ordering;
 struct Files {
     vcd: Option<VcdWriter<Pending>>,
     trace: Option<TraceWriter<Pending>>,
+    stream: Option<StreamWriter<Pending>>,
 }
 
 impl Observer for Files {
     fn wants_edges(&self) -> bool {
-        self.vcd.is_some()
+        self.vcd.is_some() || self.stream.is_some()
     }
 
     fn edge(&mut self, edge: &Edge) {
         if let Some(vcd) = &mut self.vcd {
             vcd.edge(edge);
+        }
+        if let Some(stream) = &mut self.stream {
+            stream.edge(edge);
         }
     }
 
@@ -39,6 +43,9 @@ impl Observer for Files {
         }
         if let Some(trace) = &mut self.trace {
             trace.tick(report);
+        }
+        if let Some(stream) = &mut self.stream {
+            stream.tick(report);
         }
     }
 }
@@ -67,6 +74,10 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
     let create = |name| folder.as_ref().map(|folder| folder.create(name)).transpose();
     let steps = create("steps.vcd")?;
     let rows = if arguments.no_trace { None } else { create("trace.csv")? };
+    let stream = match arguments.step_stream {
+        Some(tolerance_ns) => create("steps.pkms")?.map(|file| (file, tolerance_ns)),
+        None => None,
+    };
     let summary_file = create("summary.json")?;
 
     let interrupted = interrupt::flag();
@@ -76,6 +87,10 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
     let outputs = |simulation: &Simulation| Files {
         vcd: steps.map(|file| VcdWriter::new(file, simulation)),
         trace: rows.map(|file| TraceWriter::new(file, simulation)),
+        stream: stream.map(|(file, tolerance_ns)| {
+            let tolerance = tolerance_ns / simulation.hal().timer_period_ns();
+            StreamWriter::new(file, simulation, tolerance)
+        }),
     };
     let progress = |progress: &Progress| {
         bar.set_position(u64::from(progress.line));
@@ -119,6 +134,9 @@ fn save(folder: Folder, files: Files, mut summary_file: Pending, summary: &Summa
     }
     if let Some(trace) = files.trace {
         done.push(trace.finish().map_err(|error| told("trace.csv", &error))?);
+    }
+    if let Some(stream) = files.stream {
+        done.push(stream.finish().map_err(|error| told("steps.pkms", &error))?);
     }
     writeln!(summary_file, "{}", summary::json(summary)?).map_err(|error| told("summary.json", &error))?;
     done.push(summary_file);
