@@ -1,7 +1,7 @@
 //! A block: the words of one line, read and checked but not yet executed.
 
 use crate::error::{Code, Error, ErrorKind};
-use crate::expression::{self, Reference, Scope, UNKNOWN};
+use crate::expression::{self, Reference, Scope, Tolerance, UNKNOWN};
 use crate::lexer::{self, Fault, Rest, fault, fault_here, into_fault};
 use crate::line::Line;
 use crate::modal::*;
@@ -277,6 +277,7 @@ impl Block {
             _ => {}
         }
         let after = &input[1..];
+        let scope = &Created { scope, line, settings: &self.settings, name: None };
         let upper = letter.to_ascii_uppercase();
         match letter {
             b'g' => {
@@ -336,7 +337,12 @@ impl Block {
         let target_end = rest;
         let (rest, ()) =
             lexer::byte(b'=')(rest).map_err(|_| fault(ErrorKind::EqualMissing, input, target_end))?;
-        let (rest, value) = expression::value(rest, scope)?;
+        let name = match reference {
+            Reference::Name(name) => Some(name),
+            Reference::Number(_) => None,
+        };
+        let (rest, value) =
+            expression::value(rest, &Created { scope, line, settings: &self.settings, name })?;
         let setting = match reference {
             Reference::Number(index) if crate::parameters::is_readonly(index) => {
                 return Err(fault(ErrorKind::ParamReadonly { index }, input, target_end));
@@ -407,6 +413,53 @@ impl Block {
     /// The span of a parameter setting's target.
     pub(crate) fn setting_span(&self, at: Stretch) -> Span {
         self.stretch(at)
+    }
+}
+
+/// What expressions see: in LinuxCNC a name on the left of a setting exists from there on, with value 0, so that
+/// `#<n>=[#<n>+1]` needs no first value (checked with rs274 2.9). pkm's own dialect refuses that.
+struct Created<'a, S> {
+    scope: &'a S,
+    line: &'a Line,
+    settings: &'a [Setting],
+    name: Option<&'a [u8]>,
+}
+
+impl<S: Scope> Created<'_, S> {
+    fn is_created(&self, name: &[u8]) -> bool {
+        let is_set = |setting: &Setting| match *setting {
+            Setting::Name { start, end, .. } => {
+                self.line.code().get(start.into()..end.into()).is_some_and(|set| set == name)
+            }
+            Setting::Number { .. } => false,
+        };
+        !self.scope.strict() && (self.name == Some(name) || self.settings.iter().any(is_set))
+    }
+}
+
+impl<S: Scope> Scope for Created<'_, S> {
+    fn numbered(&self, index: i32) -> Result<f64, ErrorKind> {
+        self.scope.numbered(index)
+    }
+
+    fn named(&self, name: &[u8]) -> Option<f64> {
+        self.scope.named(name).or_else(|| self.is_created(name).then_some(0.0))
+    }
+
+    fn tolerance(&self) -> Tolerance {
+        self.scope.tolerance()
+    }
+
+    fn strict(&self) -> bool {
+        self.scope.strict()
+    }
+
+    fn exists(&self, name: &[u8]) -> bool {
+        self.scope.exists(name) || self.is_created(name)
+    }
+
+    fn is_static(&self) -> bool {
+        self.scope.is_static()
     }
 }
 

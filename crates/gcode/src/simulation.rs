@@ -15,18 +15,31 @@ pub struct SimulatedMachine<S> {
     g92: [f64; 9],
     units: LengthUnit,
     probed: Option<[f64; 9]>,
+    /// The interpreter asks where the tool is: after a probe, a tool change or a new tool table, not after an input
+    /// (checked with rs274 2.9).
+    is_asked: bool,
 }
 
 impl<S: CanonSink> SimulatedMachine<S> {
     /// A machine at position 0 that hands every command to `sink`.
     pub fn new(sink: S) -> Self {
         let zero = [0.0; 9];
-        Self { sink, position: zero, g5x: zero, g92: zero, units: LengthUnit::Mm, probed: None }
+        Self {
+            sink,
+            position: zero,
+            g5x: zero,
+            g92: zero,
+            units: LengthUnit::Mm,
+            probed: None,
+            is_asked: false,
+        }
     }
 
     /// Tells the interpreter what the machine did.
     pub fn answer(&mut self, interpreter: &mut Interpreter) {
-        interpreter.set_position(Position::from_array(self.position));
+        if core::mem::take(&mut self.is_asked) {
+            interpreter.set_position(Position::from_array(self.position));
+        }
         if let Some(point) = self.probed.take() {
             interpreter.set_probe_result(Position::from_array(point), false);
         }
@@ -88,6 +101,13 @@ impl<S: CanonSink> CanonSink for SimulatedMachine<S> {
             }
             _ => {}
         }
+        self.is_asked |= matches!(
+            command,
+            Canon::StraightProbe { .. }
+                | Canon::ChangeTool { .. }
+                | Canon::ChangeToolNumber { .. }
+                | Canon::ReloadTooldata
+        );
         self.sink.command(command, span);
     }
 

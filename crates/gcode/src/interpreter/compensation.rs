@@ -10,6 +10,7 @@ use super::{Out, state::State};
 use crate::block::Block;
 use crate::error::{Code, Error, ErrorKind};
 use crate::modal::*;
+use crate::settings::Dialect;
 use pkm_canon::{LengthUnit, Plane};
 use pkm_kins::maths;
 
@@ -146,6 +147,18 @@ impl State {
             self.cutter.begin = None;
         }
         Ok(())
+    }
+
+    /// G20, G21 between compensated moves. LinuxCNC converts the begin of the waiting move once for every waiting command
+    /// (checked with rs274 2.9); pkm once.
+    pub(crate) fn convert_compensation(&mut self, factor: f64, out: &mut Out<'_>) {
+        let waiting = out.queue.scale(factor);
+        let times = if self.settings.dialect == Dialect::Pkm { 1 } else { waiting };
+        self.cutter.radius *= factor;
+        self.cutter.tool = self.cutter.tool.map(|value| value * factor);
+        for _ in 0..times {
+            self.cutter.begin = self.cutter.begin.map(|point| point.map(|value| value * factor));
+        }
     }
 
     /// The waiting moves go out as they are.

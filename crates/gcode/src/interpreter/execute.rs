@@ -42,6 +42,7 @@ impl State {
         self.arc_mode(block, out);
         self.retract_mode(block, out)?;
         self.non_modal(block, out)?;
+        synch |= block.g(GGroup::NonModal) == Some(G10) && block.get(b'L') == Some(0.0);
         if block.motion.is_some() {
             synch |= self.motion(block, out)?;
         }

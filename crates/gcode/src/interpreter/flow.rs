@@ -167,11 +167,16 @@ impl Interpreter {
 
     /// Reads label and keyword behind the `o` at `start`.
     fn read_o_word(&mut self, start: usize) -> Result<OWord, Error> {
-        let Head { label: text, keyword, operands, wrong } = o_word::head(&self.line, start, &self.state)?;
+        let Head { label: text, mut keyword, operands, wrong } =
+            o_word::head(&self.line, start, &self.state)?;
         if let Some(error) = wrong {
-            let label = self.flow.intern(&text);
-            self.flow.wrong.push(label);
-            return Err(error);
+            // Within a definition that is passed LinuxCNC reads no keyword but sub, endsub and return; nor a call.
+            if self.flow.defining.is_none() || self.state.settings.dialect == Dialect::Pkm {
+                let label = self.flow.intern(&text);
+                self.flow.wrong.push(label);
+                return Err(error);
+            }
+            keyword = Some(Keyword::Call);
         }
         let span = self.line.code_span(start, operands);
         let label = self.flow.intern(&text);

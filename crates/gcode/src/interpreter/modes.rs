@@ -19,6 +19,17 @@ impl State {
         }
     }
 
+    /// 2.9 refuses spindles that there are: M51 any, M19 "all" (checked with rs274 2.9).
+    fn refuse_spindle_word(&self, refused: impl Fn(f64) -> bool, block: &Block) -> Result<(), Error> {
+        match block.get(b'$') {
+            Some(value) if refused(value) => {
+                let last = self.settings.spindles.saturating_sub(1);
+                Err(block.word_error(b'$', ErrorKind::SpindleNumber { value, last }))
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn spindle_at(&mut self, n: i32) -> &mut Spindle {
         &mut self.modal.spindles[(n & 7) as usize]
     }
@@ -131,6 +142,9 @@ impl State {
         {
             return wrong(b'Q', timeout);
         }
+        if self.settings.dialect == Dialect::LinuxCnc29 {
+            self.refuse_spindle_word(|n| n < 0.0, block)?;
+        }
         for spindle in self.spindles_of(block, 0) {
             if angle.is_some() || way.is_some() {
                 self.spindle_at(spindle).turning = None;
@@ -184,6 +198,9 @@ impl State {
             }
             50 => self.set_feed_override(on, out),
             51 => {
+                if self.settings.dialect == Dialect::LinuxCnc29 {
+                    self.refuse_spindle_word(|_| true, block)?;
+                }
                 for spindle in self.spindles_of(block, 0) {
                     self.set_speed_override(spindle, on, out);
                 }
@@ -312,7 +329,11 @@ impl State {
             Some(_) => LengthUnit::Mm,
         };
         out.emit(Canon::UseLengthUnits(units));
+        let factor = self.modal.units.mm() / units.mm();
         self.convert_units(units);
+        if factor != 1.0 && self.modal.compensation.is_some() {
+            self.convert_compensation(factor, out);
+        }
     }
 
     /// G7, G8: X words are diameters or radii, those of the switching block too.

@@ -1,5 +1,6 @@
 //! Commands that wait for the end of a compensated move: the move itself, and what came after it.
 
+use super::state::scale_lengths;
 use heapless::Vec;
 use pkm_canon::{Canon, CanonSink, Position, Span, Text};
 
@@ -29,7 +30,11 @@ pub(crate) enum Move {
 enum Waiting {
     Move(Move),
     Command(Canon<'static>),
-    Text { message: bool, start: usize, end: usize },
+    /// Bytes of [`Queue::text`], a comment.
+    Text {
+        start: usize,
+        end: usize,
+    },
 }
 
 /// The queue; empty whenever cutter compensation is off.
@@ -91,9 +96,10 @@ impl Queue {
         if self.waiting.is_empty() {
             return false;
         }
-        let (message, text) = match command {
-            Canon::Comment(Text(text)) => (false, text),
-            Canon::Message(Text(text)) => (true, text),
+        let text = match command {
+            // LinuxCNC is in a hurry with this remark (checked with rs274 2.9).
+            Canon::Comment(Text(text)) if text.starts_with(b"interpreter: Lathe") => return false,
+            Canon::Comment(Text(text)) => text,
             _ => match waits(command) {
                 Some(command) => {
                     self.push(Waiting::Command(command), span);
@@ -105,7 +111,7 @@ impl Queue {
         let start = self.text.len();
         self.overflow |= self.text.extend_from_slice(text).is_err();
         let end = self.text.len();
-        self.push(Waiting::Text { message, start, end }, span);
+        self.push(Waiting::Text { start, end }, span);
         true
     }
 
@@ -115,6 +121,21 @@ impl Queue {
             Waiting::Move(waiting) => Some(waiting),
             _ => None,
         })
+    }
+
+    /// G20, G21: lengths in force change their number. The result is how many entries wait.
+    pub(crate) fn scale(&mut self, factor: f64) -> usize {
+        for waiting in self.moves_mut() {
+            match waiting {
+                Move::Straight { end, .. } => scale_lengths(end, factor),
+                Move::Arc { end, centre, .. } => {
+                    scale_lengths(end, factor);
+                    centre.iter_mut().for_each(|value| *value *= factor);
+                }
+            }
+        }
+        self.shift.iter_mut().for_each(|value| *value *= factor);
+        self.waiting.len()
     }
 
     /// Everything goes out in its order.
@@ -140,10 +161,9 @@ impl Queue {
                     sink.command(&Canon::ArcFeed { end, first_centre, second_centre, turns }, *span);
                 }
                 Waiting::Command(ref command) => sink.command(command, *span),
-                Waiting::Text { message, start, end } => {
+                Waiting::Text { start, end } => {
                     let text = Text(self.text.get(start..end).unwrap_or_default());
-                    let command = if message { Canon::Message(text) } else { Canon::Comment(text) };
-                    sink.command(&command, *span);
+                    sink.command(&Canon::Comment(text), *span);
                 }
             }
         }

@@ -4,6 +4,7 @@ use super::{Out, state::State};
 use crate::block::Block;
 use crate::error::{Code, Error, ErrorKind};
 use crate::modal::*;
+use crate::settings::Dialect;
 use heapless::Vec;
 use pkm_canon::{Canon, ControlPoint, Plane};
 
@@ -20,6 +21,7 @@ pub(crate) struct Splines {
     order: u32,
     /// Last tangent of a G5 (P, Q), which the next one may continue.
     tangent: Option<[f64; 2]>,
+    last_tangent: [f64; 2],
 }
 
 impl Splines {
@@ -30,22 +32,22 @@ impl Splines {
 
     /// Any other motion ends a spline.
     pub(crate) fn forget(&mut self) {
-        self.points.clear();
         self.tangent = None;
     }
 }
 
 impl State {
+    /// What holds for G5 and G5.1.
     fn check_spline(&self, code: GCode, block: &Block) -> Result<(), Error> {
         let refused =
             block.has_any(b"ZABCUVW") || self.modal.plane != Plane::Xy || self.modal.compensation.is_some();
         if refused {
             return Err(block.motion_error(ErrorKind::SplineAxes { code: Code(code) }));
         }
-        if self.modal.feed == 0.0 {
-            return Err(block.motion_error(ErrorKind::FeedZero { code: Code(code) }));
+        if self.settings.dialect == Dialect::LinuxCnc29 && self.modal.feed_mode == FeedMode::PerTurn {
+            return Ok(());
         }
-        Ok(())
+        self.check_feed(code, block)
     }
 
     /// G5 I J P Q: control points start, start + (I, J), end + (P, Q), end.
@@ -59,14 +61,19 @@ impl State {
         let [i, j] = match (block.get(b'I'), block.get(b'J'), self.splines.tangent) {
             (Some(i), Some(j), _) => [i, j],
             (None, None, Some([p, q])) => [-p, -q],
+            // 2.9 does not ask whether the motion before was a G5 (checked with rs274 2.9).
+            (None, None, None) if self.settings.dialect == Dialect::LinuxCnc29 => {
+                let [p, q] = self.splines.last_tangent;
+                [-p, -q]
+            }
             _ => return words("I and J"),
         };
         let end = self.end_point(block)?;
         let [x, y, ..] = self.position;
         let points = [[x, y], [x + i, y + j], [end[0] + p, end[1] + q], [end[0], end[1]]];
         self.emit_points(&points, out);
-        self.splines.tangent = Some([p, q]);
-        self.modal.motion = G5;
+        (self.splines.tangent, self.splines.last_tangent) = (Some([p, q]), [p, q]);
+        self.set_spline_motion(G5);
         self.position = end;
         Ok(())
     }
@@ -81,43 +88,71 @@ impl State {
         let end = self.end_point(block)?;
         let [x, y, ..] = self.position;
         self.emit_points(&[[x, y], [x + i, y + j], [end[0], end[1]]], out);
-        self.modal.motion = G5_1;
+        self.set_spline_motion(G5_1);
         self.position = end;
         Ok(())
     }
 
-    fn emit_points(&self, points: &[[f64; 2]], out: &mut Out<'_>) {
-        let mut control: Vec<ControlPoint, 4> = Vec::new();
-        for [first, second] in points {
-            let _ = control.push(ControlPoint { first: *first, second: *second, weight: 1.0 });
+    /// In LinuxCNC the motion before stays in force: axis words alone go on with it (checked with rs274 2.9).
+    fn set_spline_motion(&mut self, code: GCode) {
+        if self.settings.dialect == Dialect::Pkm {
+            self.modal.motion = code;
         }
-        out.emit(Canon::NurbsFeed { points: &control, order: points.len() as u32 });
+    }
+
+    /// A whole spline. Control points that another motion cut off are still there in LinuxCNC and go before it (checked
+    /// with rs274 2.9).
+    fn emit_points(&mut self, points: &[[f64; 2]], out: &mut Out<'_>) {
+        if self.settings.dialect == Dialect::Pkm {
+            self.splines.points.clear();
+        }
+        for [first, second] in points {
+            let _ = self.splines.points.push(ControlPoint { first: *first, second: *second, weight: 1.0 });
+        }
+        out.emit(Canon::NurbsFeed { points: &self.splines.points, order: points.len() as u32 });
+        self.splines.points.clear();
     }
 
     /// G5.2 X Y P L: one control point; the first block without X Y begins at the present position with weight P.
     pub(crate) fn nurbs_point(&mut self, block: &Block) -> Result<(), Error> {
-        self.check_spline(G5_2, block)?;
-        let weight = block.get(b'P');
         let words = |words| Err(block.motion_error(ErrorKind::SplineWords { code: Code(G5_2), words }));
-        if block.has(b'X') != block.has(b'Y') {
+        let compat = self.settings.dialect != Dialect::Pkm;
+        if !compat {
+            self.check_spline(G5_2, block)?;
+        }
+        let (point, weight) = (block.has(b'X'), block.get(b'P').unwrap_or(-1.0));
+        if point != block.has(b'Y') {
             return words("X and Y");
         }
-        let begins = !self.splines.is_open();
+        let begins = self.splines.points.is_empty() || self.modal.motion != G5_2;
+        if !self.splines.points.is_empty() && weight <= 0.0 {
+            return match block.has(b'P') {
+                true => Err(block.word_error(b'P', ErrorKind::NurbsWeight { value: weight })),
+                false => words("P"),
+            };
+        }
+        if !self.splines.points.is_empty() && !point {
+            return words("X and Y");
+        }
+        if compat && self.modal.feed_mode == FeedMode::PerMinute && self.modal.feed == 0.0 {
+            return Err(block.motion_error(ErrorKind::FeedZero { code: Code(G5_2) }));
+        }
         if begins {
-            let first_weight = if block.has(b'X') { None } else { weight };
+            self.splines.points.clear();
+            let first_weight = if !point && weight > 0.0 { weight } else { 1.0 };
             let [first, second, ..] = self.position;
             self.splines.order = 3;
-            self.push_point(ControlPoint { first, second, weight: first_weight.unwrap_or(1.0) }, block)?;
+            self.push_point(ControlPoint { first, second, weight: first_weight }, block)?;
         }
-        if let Some(l) = block.get(b'L') {
-            self.splines.order = self.splines.order.max(l as u32);
+        if let Some(l) = block.get(b'L')
+            && l > 3.0
+        {
+            self.splines.order = l as u32;
         }
-        if block.has(b'X') {
-            let weight = match weight {
-                None if !begins => return words("P"),
-                weight => weight.unwrap_or(1.0),
-            };
-            if weight <= 0.0 {
+        if point {
+            // LinuxCNC does not look at the weight of a point in the first block.
+            let weight = if compat || block.has(b'P') { weight } else { 1.0 };
+            if !compat && weight <= 0.0 {
                 return Err(block.word_error(b'P', ErrorKind::NurbsWeight { value: weight }));
             }
             let end = self.end_point(block)?;
@@ -143,6 +178,7 @@ impl State {
         if let Some(last) = self.splines.points.last() {
             (self.position[0], self.position[1]) = (last.first, last.second);
         }
+        self.splines.points.clear();
         self.splines.forget();
         self.modal.motion = G80;
         Ok(())

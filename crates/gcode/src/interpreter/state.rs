@@ -83,7 +83,11 @@ impl State {
             0.0 => [0.0; 9],
             _ => self.program_units(self.parameters.nine(parameters::G92_OFFSET)),
         };
-        self.position = self.program_point(machine);
+        // The machine that rs274 simulates knows no rotation.
+        self.position = match self.settings.imitates_rs274 {
+            true => core::array::from_fn(|axis| machine[axis] - self.g5x[axis] - self.g92[axis]),
+            false => self.program_point(machine),
+        };
     }
 
     /// Takes over offset and rotation of a coordinate system; the position is not touched.

@@ -4,6 +4,7 @@ use super::{Out, state::State};
 use crate::block::Block;
 use crate::error::{Code, Error, ErrorKind};
 use crate::modal::*;
+use crate::settings::Dialect;
 use pkm_canon::{Canon, Plane, Position};
 use pkm_kins::maths;
 
@@ -44,7 +45,8 @@ impl State {
         let pitch = self.pitch_word(G33_1, block)?;
         let end = self.end_point(block)?;
         let retract_scale = block.get(b'I').unwrap_or(1.0);
-        if retract_scale < 1.0 {
+        // LinuxCNC 2.9 takes any (checked with rs274 2.9).
+        if retract_scale < 1.0 && self.settings.dialect != Dialect::LinuxCnc29 {
             return Err(block.word_error(b'I', ErrorKind::NegativeWord { letter: 'I', value: retract_scale }));
         }
         out.emit(Canon::StartSpeedFeedSync { spindle, feed_per_turn: pitch, velocity_mode: 0 });
@@ -84,12 +86,14 @@ impl State {
         if [1, 3, 4, 5, 6, 7, 8].iter().any(|axis| end[*axis] != self.position[*axis]) {
             return Err(block.motion_error(ErrorKind::ThreadAxes));
         }
-        let taper = block.get(b'L').unwrap_or(0.0) as i32;
+        let taper_length = block.get(b'E').unwrap_or(0.0);
+        // Without a length there is no taper (checked with rs274 2.9).
+        let taper = if taper_length == 0.0 { 0 } else { block.get(b'L').unwrap_or(0.0) as i32 };
         let thread = Thread {
             pitch,
             taper_in: matches!(taper, 1 | 3),
             taper_out: matches!(taper, 2 | 3),
-            taper_length: block.get(b'E').unwrap_or(0.0),
+            taper_length,
             peak: i.abs(),
             height: k,
             tangent: maths::tan(block.get(b'Q').unwrap_or(0.0) * maths::PI / 180.0),

@@ -44,7 +44,10 @@ impl State {
                 }
                 let (slot, tool) = (self.modal.selected_slot.max(0), self.modal.selected_tool);
                 out.emit(Canon::ChangeTool { slot, tool });
-                self.tools.load_spindle(slot);
+                // rs274 copies the slot to slot 0: with T0 the tool stays (checked with rs274 2.9).
+                if !(slot == 0 && self.settings.imitates_rs274) {
+                    self.tools.load_spindle(slot);
+                }
                 self.loaded_slot = slot;
                 Ok(true)
             }
@@ -106,6 +109,11 @@ impl State {
             G43_1 => named(self.tool_offset),
             G43_2 => {
                 let words = block.has_axis();
+                if words && self.settings.dialect == Dialect::LinuxCnc29 {
+                    // 2.9 looks the tool of the missing H word up (checked with rs274 2.9).
+                    let number = block.get(b'H').map_or(-1, |h| h as i32);
+                    self.tool_of(block, b'H', number)?;
+                }
                 if block.has(b'H') == words {
                     let kind = ErrorKind::WordMissing { letter: 'H', code: crate::error::Code(code) };
                     return Err(block.g_error(GGroup::ToolLength, kind));
@@ -198,13 +206,13 @@ impl State {
     /// G59.3, without G92. Axes without a word keep their part of the present offset *along the system's axes*, so
     /// in a turned system X and Y change together.
     fn tool_offset_for_reading(&self, l: i32, present: &[f64; 9], block: &Block) -> [Option<f64>; 9] {
-        let (system, rotation, g92) = match l {
-            10 => (self.g5x, self.rotation_deg, self.g92),
-            _ => {
-                let first = crate::parameters::system_offset(9);
-                let offset = self.program_units(self.parameters.nine(first));
-                (offset, self.parameters.get(first + 9), [0.0; 9])
-            }
+        let (number, g92) = if l == 10 { (self.modal.system, self.g92) } else { (9, [0.0; 9]) };
+        let (system, rotation) = if l == 10 && self.settings.dialect == Dialect::Pkm {
+            (self.g5x, self.rotation_deg)
+        } else {
+            // LinuxCNC takes the parameters, also where a program has changed them since (checked with rs274 2.9).
+            let first = crate::parameters::system_offset(number);
+            (self.program_units(self.parameters.nine(first)), self.parameters.get(first + 9))
         };
         let machine = self.machine_point(self.position);
         let mut reading: [f64; 9] = core::array::from_fn(|axis| machine[axis] - system[axis]);

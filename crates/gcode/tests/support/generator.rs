@@ -1,5 +1,11 @@
 //! Seeded random programs: plausible ones, and the same with one thing spoiled.
 
+#[path = "generator/deeper.rs"]
+mod deeper;
+
+#[allow(unused_imports)] // the example prints programs alone
+pub use deeper::{SUB_FILES, variables};
+
 use pkm_kins::maths;
 use std::fmt::Write;
 
@@ -58,10 +64,18 @@ pub enum Flavour {
     Compensation,
     Everything,
     Spoiled,
+    Lathe,
+    Splines,
+    Loops,
+    Calls,
+    Tables,
+    /// All of these, and the same spoiled.
+    Mixed,
+    SpoiledMixed,
 }
 
 impl Flavour {
-    pub const ALL: [Flavour; 10] = [
+    pub const ALL: [Flavour; 17] = [
         Flavour::Motion,
         Flavour::Arcs,
         Flavour::Offsets,
@@ -72,6 +86,13 @@ impl Flavour {
         Flavour::Compensation,
         Flavour::Everything,
         Flavour::Spoiled,
+        Flavour::Lathe,
+        Flavour::Splines,
+        Flavour::Loops,
+        Flavour::Calls,
+        Flavour::Tables,
+        Flavour::Mixed,
+        Flavour::SpoiledMixed,
     ];
 }
 
@@ -91,7 +112,7 @@ impl Generator {
             self.text.push('\n');
         }
         self.text.push_str(if self.random.chance(50) { "M2\n" } else { "M30\n" });
-        if flavour == Flavour::Spoiled {
+        if matches!(flavour, Flavour::Spoiled | Flavour::SpoiledMixed) {
             self.spoil();
         }
     }
@@ -139,6 +160,20 @@ impl Generator {
             },
             Flavour::Flow => self.flow(),
             Flavour::Compensation => self.compensated(),
+            Flavour::Lathe => self.lathe(),
+            Flavour::Splines => self.spline(),
+            Flavour::Loops => self.loops(),
+            Flavour::Calls => self.calls(),
+            Flavour::Tables => self.tables(),
+            Flavour::Mixed | Flavour::SpoiledMixed => match self.random.below(7) {
+                0 => self.lathe(),
+                1 => self.spline(),
+                2 => self.loops(),
+                3 => self.calls(),
+                4 => self.tables(),
+                5 => self.compensated(),
+                _ => self.block(Flavour::Everything),
+            },
             Flavour::Everything | Flavour::Spoiled => match self.random.below(9) {
                 0 | 1 => self.motion(),
                 2 => self.arc(),

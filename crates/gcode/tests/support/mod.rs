@@ -4,7 +4,9 @@
 pub mod generator;
 
 use pkm_canon::text::{Spelling, TextWriter};
-use pkm_gcode::{FileSource, LineSource, MemorySource, Settings, ToolTable, canon_text};
+use pkm_gcode::{
+    FileSource, Interpreter, LineSource, MemorySource, ParameterFile, Settings, ToolTable, canon_text_of,
+};
 use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
@@ -15,6 +17,8 @@ pub struct Outcome {
     pub lines: Vec<String>,
     pub failed_block: Option<String>,
     pub message: String,
+    /// What is kept in the parameter file, if there is one: number and value.
+    pub kept: Vec<(i32, f64)>,
 }
 
 /// The tool table that both sides use.
@@ -35,26 +39,48 @@ fn stream(text: &[u8]) -> Vec<String> {
 
 /// The program as pkm interprets it, on the machine that `rs274` simulates.
 pub fn pkm(program: &[u8]) -> Outcome {
-    interpret(&mut MemorySource::new(program), TOOLS.as_bytes())
+    interpret(&mut MemorySource::new(program), TOOLS.as_bytes(), None)
 }
 
 /// A program file as pkm interprets it, with a tool table; subroutine files stand beside it.
 pub fn pkm_file(program: &Path, tools: &[u8]) -> Outcome {
     let beside = program.parent().expect("a folder").to_path_buf();
-    interpret(&mut FileSource::open(program, vec![beside]).expect("a file"), tools)
+    interpret(&mut FileSource::open(program, vec![beside]).expect("a file"), tools, None)
 }
 
-fn interpret(source: &mut dyn LineSource, tools: &[u8]) -> Outcome {
+/// What `rs274` has interpreted last in that directory, with the parameters it began with.
+pub fn pkm_after(directory: &Path, variables: Option<&str>) -> Outcome {
+    let program = directory.join("program.ngc");
+    let mut source = FileSource::open(&program, vec![directory.to_path_buf()]).expect("a file");
+    interpret(&mut source, TOOLS.as_bytes(), variables)
+}
+
+/// The numbers and values of a parameter file.
+fn kept(text: &[u8]) -> Vec<(i32, f64)> {
+    let number = |line: &str| {
+        let (index, value) = line.split_once(char::is_whitespace)?;
+        Some((index.parse().ok()?, value.trim().parse().ok()?))
+    };
+    text_of(text).lines().filter_map(number).collect()
+}
+
+fn interpret(source: &mut dyn LineSource, tools: &[u8], variables: Option<&str>) -> Outcome {
     let tools = ToolTable::parse(tools, |_, _| {}).expect("a small table");
     let mut output: Vec<u8> = Vec::new();
     let mut writer = TextWriter::new(|bytes: &[u8]| output.extend_from_slice(bytes), Spelling::V2_9);
     let (mut failed_block, mut message) = (None, String::new());
-    canon_text(Settings::rs274(), tools, source, &mut writer, |error, line| {
+    let mut interpreter = Interpreter::new(Settings::rs274());
+    *interpreter.tools_mut() = tools;
+    let file = variables.map(|text| {
+        ParameterFile::read(text.as_bytes(), interpreter.parameters_mut()).expect("a parameter file")
+    });
+    canon_text_of(&mut interpreter, source, &mut writer, |error, line| {
         failed_block = Some(text_of(line));
         message = format!("[{}] {error} at {:?}", error.kind.code(), error.span);
         false
     });
-    Outcome { lines: stream(&output), failed_block, message }
+    let kept = file.map_or_else(Vec::new, |file| kept(&file.text(interpreter.parameters())));
+    Outcome { lines: stream(&output), failed_block, message, kept }
 }
 
 /// True if LinuxCNC's interpreter is installed.
@@ -62,19 +88,34 @@ pub fn has_rs274() -> bool {
     Command::new("rs274").arg("-h").output().is_ok()
 }
 
-/// The program as `rs274 -g` interprets it; `None` if it does not end in time.
-pub fn rs274(program: &[u8], directory: &Path) -> Option<Outcome> {
+/// The program as `rs274 -g` interprets it, with the subroutine files beside it; `None` if it does not end in time.
+pub fn rs274(program: &[u8], directory: &Path, variables: Option<&str>) -> Option<Outcome> {
     let file = directory.join("program.ngc");
     let tools = directory.join("tool.tbl");
     write(&file, program);
     write(&tools, TOOLS.as_bytes());
-    rs274_file(&file, &tools, directory)
+    for (name, text) in generator::SUB_FILES {
+        write(&directory.join(name), text.as_bytes());
+    }
+    let Some(variables) = variables else { return run_rs274(&file, &tools, directory, &[]) };
+    let path = directory.join("variables");
+    write(&path, variables.as_bytes());
+    let mut outcome = run_rs274(&file, &tools, directory, &[OsStr::new("-v"), path.as_os_str()])?;
+    outcome.kept = kept(&std::fs::read(&path).expect("the parameter file"));
+    Some(outcome)
 }
 
 /// A program file as `rs274 -g` interprets it, run in `directory`; `None` if it does not end in time.
 pub fn rs274_file(program: &Path, tools: &Path, directory: &Path) -> Option<Outcome> {
+    run_rs274(program, tools, directory, &[])
+}
+
+fn run_rs274(program: &Path, tools: &Path, directory: &Path, options: &[&OsStr]) -> Option<Outcome> {
     let output = Command::new("timeout")
         .args(["10", "rs274"].map(OsStr::new))
+        .args(options)
+        // All that run share one map of the tools there; so each test has its own.
+        .env("HOME", directory)
         .args([OsStr::new("-t"), tools.as_os_str(), OsStr::new("-g"), program.as_os_str()])
         .current_dir(directory)
         .output()
@@ -89,6 +130,7 @@ pub fn rs274_file(program: &Path, tools: &Path, directory: &Path) -> Option<Outc
         lines: stream(&output.stdout),
         failed_block: failed.then(|| talk.last().map(|line| line.to_string()).unwrap_or_default()),
         message: if failed { talk[talk.len().saturating_sub(2)].to_string() } else { String::new() },
+        kept: Vec::new(),
     })
 }
 
@@ -119,6 +161,15 @@ pub fn difference(oracle: &Outcome, ours: &Outcome) -> Option<String> {
             "failing block\n  rs274: {:?} {:?}\n  pkm:   {:?} {:?}",
             oracle.failed_block, oracle.message, ours.failed_block, ours.message
         ));
+    }
+    // LinuxCNC writes six decimals.
+    let close = |a: &(i32, f64), b: &(i32, f64)| a.0 == b.0 && (a.1 - b.1).abs() <= 2e-6;
+    let differs = |(a, b): &(&(i32, f64), &(i32, f64))| !close(a, b);
+    if let Some((a, b)) = oracle.kept.iter().zip(&ours.kept).find(differs) {
+        return Some(format!("kept parameter\n  rs274: {a:?}\n  pkm:   {b:?}"));
+    }
+    if oracle.kept.len() != ours.kept.len() {
+        return Some(format!("{} parameters kept, {} by pkm", oracle.kept.len(), ours.kept.len()));
     }
     None
 }

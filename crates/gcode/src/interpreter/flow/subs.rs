@@ -211,6 +211,9 @@ impl Interpreter {
         }
         let repeats = self.block.get(b'L').map_or(1, |l| l as i64);
         if repeats <= 0 {
+            if self.state.settings.dialect != Dialect::Pkm {
+                return self.enter_without_running(number as i32, source);
+            }
             return Ok(());
         }
         let mut text = LabelText::new();
@@ -218,6 +221,29 @@ impl Interpreter {
         let label = self.flow.intern(&text);
         self.flow.text = text;
         self.enter(label, Style::Fanuc, span, repeats, None, source)
+    }
+
+    /// M98 L0: LinuxCNC opens the call all the same and goes on in it, so that the next M99 returns to here (checked with
+    /// rs274 2.9).
+    fn enter_without_running(&mut self, number: i32, source: &mut dyn LineSource) -> Result<(), Error> {
+        let span = self.block.m_span(crate::modal::MGroup::Call);
+        if self.flow.frames.len() >= MAX_CALLS {
+            return Err(self.flow_error(ErrorKind::ODepth { limit: MAX_CALLS as u8 }, span));
+        }
+        let mut text = LabelText::new();
+        push_integer(&mut text, number);
+        let (here, sub) = (source.place(), self.flow.intern(&text));
+        self.flow.frames.push(Frame {
+            style: Style::Fanuc,
+            call: span,
+            sub,
+            return_to: here,
+            body: here,
+            repeats_left: 0,
+            arguments: self.state.parameters.arguments(),
+        });
+        self.state.enter_sub(None);
+        Ok(())
     }
 
     /// M99: returns from a Fanuc program. False at the main level, where it ends the program.
