@@ -84,12 +84,12 @@ impl State {
             let units = if saved.modal.units == LengthUnit::Inch { "G20" } else { "G21" };
             self.run_text(units, span, out)?;
         }
-        let text = self.g_codes_to(saved);
-        self.run_text(&text, span, out)?;
+        // The M codes first (checked with rs274 2.9).
         for text in self.m_codes_to(&saved.modal).iter().filter(|text| !text.is_empty()) {
             self.run_text(text, span, out)?;
         }
-        Ok(())
+        let text = self.g_codes_to(saved);
+        self.run_text(&text, span, out)
     }
 
     /// Interprets a line that is not in the source; errors point at `span`.

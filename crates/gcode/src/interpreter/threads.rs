@@ -53,6 +53,10 @@ impl State {
         out.emit(Canon::RigidTap { end: Position::from_array(end), retract_scale });
         out.emit(Canon::StopSpeedFeedSync);
         self.modal.motion = G33_1;
+        // Back at the start; LinuxCNC believes that the other axes stay (checked with rs274 2.9).
+        if self.settings.dialect != Dialect::Pkm {
+            self.position[3..].copy_from_slice(&end[3..]);
+        }
         Ok(())
     }
 
