@@ -74,8 +74,8 @@ fn interpret(source: &mut dyn LineSource, tools: &[u8], variables: Option<&str>)
     let file = variables.map(|text| {
         ParameterFile::read(text.as_bytes(), interpreter.parameters_mut()).expect("a parameter file")
     });
-    canon_text_of(&mut interpreter, source, &mut writer, |error, line| {
-        failed_block = Some(text_of(line));
+    canon_text_of(&mut interpreter, source, &mut writer, |error, interpreter, _| {
+        failed_block = Some(text_of(interpreter.source_line()));
         message = format!("[{}] {error} at {:?}", error.kind.code(), error.span);
         false
     });
