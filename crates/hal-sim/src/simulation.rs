@@ -530,6 +530,11 @@ impl Simulation {
         offsets
     }
 
+    /// Setpoints that are missing now, in a row.
+    pub fn missed_periods(&self) -> u32 {
+        self.motion().missed()
+    }
+
     /// Every joint knows where it is.
     pub fn is_homed(&self) -> bool {
         self.motion().is_homed()

@@ -128,6 +128,19 @@ pub(crate) struct Run {
     /// Feed override, percent of the programmed feed
     #[arg(long, value_name = "PERCENT", default_value_t = 100.0, value_parser = percent)]
     pub feed_override: f64,
+    /// The machine begins without knowing where it is: it homes first, to the machine file's home pose
+    #[arg(long)]
+    pub home: bool,
+    /// A fault on an input pin, repeatable: TICK,PIN,KIND or TICK+TICKS,PIN,KIND; kinds are set=VALUE, freeze, invert,
+    /// offset=VALUE, nan, inf. `pkm hal show --machine FILE pin` lists the pins
+    #[arg(long = "fault", value_name = "FAULT", conflicts_with = "faults")]
+    pub fault: Vec<pkm_hal_sim::PinFault>,
+    /// Rehearse the program with N random faults, one at a time; each is judged and printed so that it can be replayed
+    #[arg(long, value_name = "N", conflicts_with_all = ["out", "trace_substeps", "feed_override"])]
+    pub faults: Option<u64>,
+    /// Of the random faults
+    #[arg(long, value_name = "S", default_value_t = 0, requires = "faults")]
+    pub seed: u64,
     /// End the run, not completed, after so many servo periods
     #[arg(long, value_name = "N", default_value_t = 100_000_000)]
     pub max_ticks: u64,

@@ -13,10 +13,10 @@ use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_hal_sim::{FaultKind, Homing, PinFault, PinType, Role, Setpoint, Simulation, TickError, Value};
 use pkm_machine::Machine;
 
-/// Periods between two copies of the machine.
-const EVERY: usize = 32;
-/// Longest rehearsal, servo periods.
-const MOST_PERIODS: usize = 10_000_000;
+/// Copies of the machine that are kept at most.
+const MOST_COPIES: usize = 512;
+/// Longest rehearsal, servo periods: its memory grows with it.
+const MOST_PERIODS: usize = 2_000_000;
 /// Pins that the planner listens to: with a fault on one of them, setpoints are others.
 const PLANNER_PINS: [&str; 4] = ["motion.feed-hold", "motion.adaptive-feed", "halui.abort", "servo.doubled"];
 /// Periods in which a machine must have come to rest.
@@ -27,8 +27,10 @@ pub struct Rehearsal<'a> {
     program: &'a Program,
     machine: &'a Machine,
     options: Options,
-    /// The machine as it stood at the ends of periods 0, [`EVERY`], ...
+    /// The machine as it stood at the ends of periods 0, `every`, ...
     copies: Vec<Session>,
+    /// Periods between two copies.
+    every: usize,
     setpoints: Vec<Setpoint>,
     rows: Vec<Row>,
     /// What a fault can be put on.
@@ -68,6 +70,7 @@ fn row(simulation: &Simulation, homing: bool, zeroed: bool) -> Row {
         on: simulation.drives_on(),
         homed: simulation.is_homed() && !homing,
         zeroed,
+        missed: simulation.missed_periods() > 0,
         commanded: [0.0; JOINTS],
         counted: [0.0; JOINTS],
         actual: [0.0; JOINTS],
@@ -150,6 +153,7 @@ impl<'a> Rehearsal<'a> {
             machine,
             options,
             copies: Vec::new(),
+            every: 16,
             setpoints: Vec::new(),
             rows: vec![row(&controller.simulation, controller.is_homing(), false)],
             pins: controller
@@ -162,7 +166,15 @@ impl<'a> Rehearsal<'a> {
         };
         while !controller.is_done() && kept.rows.len() < MOST_PERIODS {
             let periods = kept.rows.len() - 1;
-            if periods.is_multiple_of(EVERY) {
+            if kept.copies.len() == MOST_COPIES && periods.is_multiple_of(kept.every) {
+                let mut n = 0;
+                kept.copies.retain(|_| {
+                    n += 1;
+                    n % 2 == 1
+                });
+                kept.every *= 2;
+            }
+            if periods.is_multiple_of(kept.every) {
                 kept.copies.push(Session {
                     simulation: controller.simulation.clone(),
                     homing: controller.homing().cloned(),
@@ -180,6 +192,9 @@ impl<'a> Rehearsal<'a> {
         }
         if let Some(failure) = controller.feeder.failure() {
             return Err(failure.clone());
+        }
+        if !controller.is_done() {
+            return Err(messages::max_ticks(program, MOST_PERIODS as u64, controller.feeder.line()));
         }
         let verdict = judge(machine, &kept.rows, &kept.rows, End::Finished);
         verdict.map_err(|objection| messages::host(program, &format!("without a fault: {objection}")))?;
@@ -232,21 +247,22 @@ impl<'a> Rehearsal<'a> {
         PinFault { tick, ticks, pin: pin.clone(), kind }
     }
 
-    /// Runs the program with a fault, judges, and sees whether the machine can be used again.
+    /// Runs the program with faults, judges, and sees whether the machine can be used again.
     ///
     /// # Errors
-    /// The fault is for a pin that the machine does not have.
-    pub fn play(&self, fault: &PinFault) -> Result<Played, Diagnostic> {
-        let at = usize::try_from(fault.tick).unwrap_or(usize::MAX).saturating_sub(1);
-        let copy = (at / EVERY).min(self.copies.len() - 1);
+    /// A fault is for a pin that the machine does not have.
+    pub fn play(&self, faults: &[PinFault]) -> Result<Played, Diagnostic> {
+        let first = faults.iter().map(|fault| fault.tick).min().unwrap_or(1);
+        let at = usize::try_from(first).unwrap_or(usize::MAX).saturating_sub(1);
+        let copy = (at / self.every).min(self.copies.len() - 1);
         let mut session = self.copies[copy].clone();
-        let inject = session.simulation.hal_mut().inject(fault);
-        inject.map_err(|e| messages::no_such_pin(self.program, fault, &e))?;
-        let begin = copy * EVERY;
+        self.inject(&mut session.simulation, faults)?;
+        let begin = copy * self.every;
         let mut rows = self.rows[begin.saturating_sub(2)..=begin].to_vec();
-        let stop = if PLANNER_PINS.contains(&fault.pin.as_str()) {
+        let planner = |fault: &PinFault| PLANNER_PINS.contains(&fault.pin.as_str());
+        let stop = if faults.iter().any(planner) {
             rows = self.rows[..1].to_vec();
-            self.anew(fault, &mut session, &mut rows)?
+            self.anew(faults, &mut session, &mut rows)?
         } else {
             let stop = session.run(&self.setpoints, &mut rows).err();
             if stop.is_some() {
@@ -260,16 +276,23 @@ impl<'a> Rehearsal<'a> {
         Ok(Played { message: stop.map_or_else(String::new, |stop| stop.message), verdict, recovery })
     }
 
+    fn inject(&self, simulation: &mut Simulation, faults: &[PinFault]) -> Result<(), Diagnostic> {
+        for fault in faults {
+            let injected = simulation.hal_mut().inject(fault);
+            injected.map_err(|error| messages::no_such_pin(self.program, fault, &error))?;
+        }
+        Ok(())
+    }
+
     /// The whole program, interpreted and planned anew.
     fn anew(
         &self,
-        fault: &PinFault,
+        faults: &[PinFault],
         session: &mut Session,
         rows: &mut Vec<Row>,
     ) -> Result<Option<Stop>, Diagnostic> {
         let mut controller = Controller::new(self.program, self.machine, &self.options, true)?;
-        let inject = controller.simulation.hal_mut().inject(fault);
-        inject.map_err(|e| messages::no_such_pin(self.program, fault, &e))?;
+        self.inject(&mut controller.simulation, faults)?;
         let mut stop = None;
         while !controller.is_done() && stop.is_none() {
             // a feed hold that stays on would hold for ever: the operator lets go

@@ -180,7 +180,8 @@ impl<'a> Account<'a> {
     /// A period of homing: it takes time, but is no path.
     pub(crate) fn homing(&mut self, simulation: &Simulation) {
         self.ticks += 1;
-        self.last = [simulation.report().setpoint.joints; 2];
+        let joints = simulation.report().setpoint.joints;
+        (self.last, self.min, self.max) = ([joints; 2], joints, joints);
     }
 
     pub(crate) fn tick(&mut self, simulation: &Simulation, feeder: &mut Feeder<'_>) {

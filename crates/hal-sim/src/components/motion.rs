@@ -71,6 +71,9 @@ pub struct MotionJoint {
     pub homed: bool,
 }
 
+/// How long a contact may bounce when it opens, s.
+const BOUNCE_S: f64 = 0.05;
+
 /// Setpoints that may be missing in a row while the machine moves.
 pub const MOST_MISSED: u32 = 3;
 
@@ -125,8 +128,8 @@ struct State {
     offset: f64,
     /// Fed-back position less joint position, mm or rad: the same, unless steps were lost.
     feedback_offset: f64,
-    /// Enabled with a limit switch on: which one may be left.
-    leaves: [bool; 2],
+    /// Enabled with a limit switch on: it may be left for so long, s. Contacts bounce when they open.
+    leaves_s: [f64; 2],
 }
 
 /// Whether the machine follows its setpoints.
@@ -160,6 +163,8 @@ pub struct Motion {
     operator: Operator,
     mode: Mode,
     was_enabled: bool,
+    /// The last setpoint was the end of a motion.
+    rests: bool,
     /// Setpoints missing in a row.
     missed: u32,
 }
@@ -245,6 +250,7 @@ impl Motion {
             operator: Operator::default(),
             mode: Mode::Follows,
             was_enabled: true,
+            rests: true,
             missed: 0,
         };
         hal.add_component(
@@ -276,6 +282,11 @@ impl Motion {
     /// Travel of a joint in the last period, mm or rad.
     pub fn travelled(&self, joint: usize) -> f64 {
         self.states.get(joint).map_or(0.0, |state| state.moved[0])
+    }
+
+    /// Setpoints that are missing now, in a row.
+    pub const fn missed(&self) -> u32 {
+        self.missed
     }
 
     /// Every joint knows where it is.
@@ -334,7 +345,7 @@ impl Motion {
                 return Err(Fault::Acceleration { tick, pin, value, limit });
             }
             for (switch, name, towards) in LIMIT_SWITCHES {
-                let leaves = state.leaves[switch] && values.bit(pins.limit_switches[switch]);
+                let leaves = state.leaves_s[switch] > 0.0 && values.bit(pins.limit_switches[switch]);
                 if leaves && travel * towards > 0.0 {
                     return Err(Fault::LimitSwitch { tick, pin: joint_pin(n, name) });
                 }
@@ -370,15 +381,19 @@ impl Motion {
     }
 
     /// Limit switches. One that was on when the drives were enabled may be left.
-    fn limit_switches(&mut self, values: &Values, tick: u64, enabled: bool) -> Result<(), Fault> {
+    fn limit_switches(&mut self, values: &Values, tick: &Tick<'_>, enabled: bool) -> Result<(), Fault> {
         let mut result = Ok(());
         for (n, ((_, pins), state)) in self.joints.iter().zip(&mut self.states).enumerate() {
             for (switch, name, _) in LIMIT_SWITCHES {
                 let on = values.bit(pins.limit_switches[switch]);
-                let leaves = &mut state.leaves[switch];
-                *leaves = on && (*leaves || enabled && !self.was_enabled);
-                if on && !*leaves {
-                    result = result.and(Err(Fault::LimitSwitch { tick, pin: joint_pin(n, name) }));
+                let leaves_s = &mut state.leaves_s[switch];
+                if on && (*leaves_s > 0.0 || enabled && !self.was_enabled) {
+                    *leaves_s = BOUNCE_S;
+                } else if on {
+                    let pin = joint_pin(n, name);
+                    result = result.and(Err(Fault::LimitSwitch { tick: tick.number, pin }));
+                } else {
+                    *leaves_s -= tick.period.seconds();
                 }
             }
         }
@@ -404,6 +419,7 @@ impl Motion {
             values.set_bit(pins.amp_enable_out, false);
         }
         values.set_bit(self.in_position, false);
+        self.rests = true;
         self.missed = 0;
     }
 
@@ -467,16 +483,17 @@ impl Motion {
     fn follow(&mut self, values: &mut Values, tick: &Tick<'_>) -> Result<(), Fault> {
         let setpoint = tick.setpoint.filter(|_| !values.bit(self.servo_missed));
         let Some(setpoint) = setpoint else {
-            if self.states.iter().any(|state| state.moved[0] != 0.0) {
+            if !self.rests {
                 return self.bridge(values, tick);
             }
-            for (_, pins) in &self.joints {
-                values.set_float(pins.vel_cmd, 0.0);
+            for n in 0..self.joints.len() {
+                self.go(values, n, 0.0, 0.0);
             }
             return Ok(());
         };
         self.check(values, setpoint, tick)?;
         self.missed = 0;
+        self.rests = setpoint.velocities.iter().all(|velocity| *velocity == 0.0);
         for n in 0..self.joints.len() {
             self.command(values, n, setpoint.joints[n], setpoint.velocities[n]);
         }
@@ -493,7 +510,7 @@ impl Motion {
         let seconds = tick.period.seconds();
         let enabled = values.bit(self.enable);
         let watched = self.watch(values, tick.number);
-        let limits = self.limit_switches(values, tick.number, enabled);
+        let limits = self.limit_switches(values, tick, enabled);
         self.was_enabled = enabled;
         if !enabled {
             self.mode = Mode::Follows;

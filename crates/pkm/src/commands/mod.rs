@@ -2,6 +2,7 @@
 
 pub(crate) mod canon;
 pub(crate) mod check;
+pub(crate) mod faults;
 pub(crate) mod generate;
 pub(crate) mod kins;
 pub(crate) mod machines;

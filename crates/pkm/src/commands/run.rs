@@ -1,6 +1,7 @@
 //! `pkm run`: a program on the simulated machine, with its files.
 
 use crate::cli::{Format, Run};
+use crate::commands::faults;
 use crate::commands::program::{Job, Refused};
 use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
@@ -51,7 +52,11 @@ impl Observer for Files {
 }
 
 pub(crate) fn run(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
-    match (drive(arguments, messages), arguments.program.format) {
+    let result = match arguments.faults {
+        Some(count) => faults::random(arguments, count, messages),
+        None => drive(arguments, messages),
+    };
+    match (result, arguments.program.format) {
         (Err(Failure::CouldNot(diagnostics)), Format::Json) => {
             let refused = Refused::new(&arguments.program, &diagnostics);
             writeln!(stdout().lock(), "{}", serde_json::to_string(&refused).map_err(std::io::Error::from)?)?;
@@ -67,6 +72,9 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
         feed_override: arguments.feed_override / 100.0,
         substeps: arguments.trace_substeps,
         max_ticks: arguments.max_ticks,
+        home: arguments.home,
+        // The job lasts as long as the process.
+        faults: Vec::leak(arguments.fault.clone()),
         ..options
     };
     // The files are begun first: a folder that cannot be written to is told before the work.
@@ -108,17 +116,24 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
     if let (Some(kept), Some(parameters)) = (&kept, &summary.parameters) {
         kept.save(parameters)?;
     }
+    let verdict = match arguments.fault.as_slice() {
+        [] => None,
+        faults => faults::verdict(&program, &machine, &options, faults),
+    };
     let mut out = stdout().lock();
     match arguments.program.format {
         Format::Json => writeln!(out, "{}", summary::json(&summary)?)?,
         Format::Text => {
             messages.print(&summary.diagnostics);
             out.write_all(summary::text(&summary).as_bytes())?;
+            if let Some((_, sentence)) = &verdict {
+                writeln!(out, "  outcome: {sentence}")?;
+            }
         }
     }
     Ok(if interrupted.load(Ordering::Relaxed) && !summary.completed {
         Outcome::Interrupted
-    } else if summary.completed {
+    } else if summary.completed && verdict.is_none_or(|(good, _)| good) {
         Outcome::Clean
     } else {
         Outcome::No
