@@ -135,7 +135,7 @@ fn noise_of_one_count_never_trips() {
         for n in 0..machine.joints.len() {
             let step = 1.0 / machine.joints[n].to_face(machine.joints[n].steps_per_unit);
             let noise = |tick: u64| {
-                let sign = if tick % 3 == 0 { -1.0 } else { 1.0 };
+                let sign = if tick.is_multiple_of(3) { -1.0 } else { 1.0 };
                 format!("{tick}+1,joint.{n}.motor-pos-fb,offset={}", sign * step)
             };
             let faults: Vec<String> = (1..rehearsal.periods()).map(noise).collect();
