@@ -165,6 +165,18 @@ impl HvMachine {
         Ok((machine, pose))
     }
 
+    /// The machine with `active` following the program and everything else held where `joints` (seven places) says: for a
+    /// controller that drives joints one by one, as LinuxCNC does before homing. Nothing is checked.
+    pub fn holding(mut self, active: Spindle, joints: &Joints) -> Self {
+        self.active = active;
+        self.held = match active {
+            Spindle::H => [joints[2], joints[3]],
+            Spindle::V => [joints[0], joints[1]],
+        };
+        self.held_head = if self.head { joints[6] } else { 0.0 };
+        self
+    }
+
     /// The coordinates of the active mechanism.
     fn state(&self, p: &Pose) -> HvState {
         match self.active {
@@ -183,8 +195,8 @@ impl HvMachine {
         }
     }
 
-    /// A rate of a coordinate that the active mechanism does not have.
-    fn idle_axis(&self, rate: &Pose) -> Option<Axis> {
+    /// The first axis that the active mechanism does not have and whose rate (or displacement) is not 0.
+    pub fn idle_axis(&self, rate: &Pose) -> Option<Axis> {
         let idle: &[Axis] = match (self.active, self.head) {
             (Spindle::H, _) => &[Axis::C, Axis::U, Axis::V, Axis::W],
             (Spindle::V, true) => &[Axis::X, Axis::Y, Axis::Z],

@@ -569,10 +569,64 @@ impl Lambda6 {
     pub fn forward_all(&self, joints: &Joints) -> Result<Branches<(Pose, f64)>, ForwardError> {
         let circles = self.circles(joints)?;
         let mut all = Branches::new();
-        for &(found, sigma) in self.all_solutions(&circles).as_slice() {
+        for &(found, sigma) in self.all_solutions(&circles, &mut 0).as_slice() {
             all.push((Self::pose_of(&circles, found), sigma));
         }
         if all.as_slice().is_empty() { Err(ForwardError::NoAssembly) } else { Ok(all) }
+    }
+
+    /// Warm start from the seed's x, y, φ, in the seed's assembly, if |σ(seed)| ≥ `sigma_min`. A seed of all zeros means none:
+    /// then from x = y = 0, φ = ±45° − δ in the configured assembly. Adds the 3×3 solves it took to `solves`.
+    ///
+    /// # Errors
+    /// As [`Kinematics::forward`].
+    #[inline]
+    pub fn forward_counting(
+        &self,
+        joints: &Joints,
+        seed: &Pose,
+        solves: &mut u32,
+    ) -> Result<Pose, ForwardError> {
+        let circles = self.circles(joints)?;
+        let mut assembly = self.assembly;
+        let mut start = Planar3 { x: 0.0, y: 0.0, phi: assembly * (PI / 4.0) - self.yaw_offset };
+        if *seed != Pose::ZERO && seed.is_finite() {
+            // The seed's tilt is near the one just found; σ depends on x, y, φ and the horizontal arms.
+            let yaw = sincos(seed.c);
+            let mut legs = [LegState::default(); 3];
+            for ((state, leg), arm) in legs.iter_mut().zip(&self.legs).zip(circles.arms) {
+                state.arm = yawed(yaw, arm);
+                state.w = [seed.x + state.arm[0] - leg.shaft[0], seed.y + state.arm[1] - leg.shaft[1]];
+                state.rho2 = state.w[0] * state.w[0] + state.w[1] * state.w[1];
+            }
+            let sigma = self.sigma_of(&legs);
+            if fabs(sigma) >= self.sigma_min.max(1e-12) {
+                assembly = if sigma > 0.0 { 1.0 } else { -1.0 };
+                start = Planar3 { x: seed.x, y: seed.y, phi: seed.c };
+            }
+        }
+        if let Some((found, sigma)) = self.newton(&circles, start, solves)
+            && sigma * assembly > 0.0
+            && fabs(sigma) >= self.sigma_min
+        {
+            return Ok(Self::pose_of(&circles, found));
+        }
+        let mut best: Option<(Planar3, f64)> = None;
+        for &(found, sigma) in self.all_solutions(&circles, solves).as_slice() {
+            let nearer = |(other, _): (Planar3, f64)| {
+                fabs(wrap(found.phi - start.phi)) < fabs(wrap(other.phi - start.phi))
+            };
+            if sigma * assembly > 0.0 && best.is_none_or(nearer) {
+                best = Some((found, sigma));
+            }
+        }
+        match best {
+            None => Err(ForwardError::NoAssembly),
+            Some((_, sigma)) if fabs(sigma) < self.sigma_min => {
+                Err(ForwardError::Singular { measure: fabs(sigma) })
+            }
+            Some((found, _)) => Ok(Self::pose_of(&circles, found)),
+        }
     }
 }
 
@@ -621,49 +675,8 @@ impl Kinematics for Lambda6 {
         Ok(pack(&legs))
     }
 
-    /// Warm start from the seed's x, y, φ, in the seed's assembly, if |σ(seed)| ≥ `sigma_min`. A seed of all zeros means none:
-    /// then from x = y = 0, φ = ±45° − δ in the configured assembly.
     fn forward(&self, joints: &Joints, seed: &Pose) -> Result<Pose, ForwardError> {
-        let circles = self.circles(joints)?;
-        let mut assembly = self.assembly;
-        let mut start = Planar3 { x: 0.0, y: 0.0, phi: assembly * (PI / 4.0) - self.yaw_offset };
-        if *seed != Pose::ZERO && seed.is_finite() {
-            // The seed's tilt is near the one just found; σ depends on x, y, φ and the horizontal arms.
-            let yaw = sincos(seed.c);
-            let mut legs = [LegState::default(); 3];
-            for ((state, leg), arm) in legs.iter_mut().zip(&self.legs).zip(circles.arms) {
-                state.arm = yawed(yaw, arm);
-                state.w = [seed.x + state.arm[0] - leg.shaft[0], seed.y + state.arm[1] - leg.shaft[1]];
-                state.rho2 = state.w[0] * state.w[0] + state.w[1] * state.w[1];
-            }
-            let sigma = self.sigma_of(&legs);
-            if fabs(sigma) >= self.sigma_min.max(1e-12) {
-                assembly = if sigma > 0.0 { 1.0 } else { -1.0 };
-                start = Planar3 { x: seed.x, y: seed.y, phi: seed.c };
-            }
-        }
-        if let Some((found, sigma)) = self.newton(&circles, start)
-            && sigma * assembly > 0.0
-            && fabs(sigma) >= self.sigma_min
-        {
-            return Ok(Self::pose_of(&circles, found));
-        }
-        let mut best: Option<(Planar3, f64)> = None;
-        for &(found, sigma) in self.all_solutions(&circles).as_slice() {
-            let nearer = |(other, _): (Planar3, f64)| {
-                fabs(wrap(found.phi - start.phi)) < fabs(wrap(other.phi - start.phi))
-            };
-            if sigma * assembly > 0.0 && best.is_none_or(nearer) {
-                best = Some((found, sigma));
-            }
-        }
-        match best {
-            None => Err(ForwardError::NoAssembly),
-            Some((_, sigma)) if fabs(sigma) < self.sigma_min => {
-                Err(ForwardError::Singular { measure: fabs(sigma) })
-            }
-            Some((found, _)) => Ok(Self::pose_of(&circles, found)),
-        }
+        self.forward_counting(joints, seed, &mut 0)
     }
 
     /// J_q = J · diag(1, E): the twist form times the axes of ψ̇, θ̇, φ̇.

@@ -41,11 +41,16 @@ pub(super) fn wrap(angle: f64) -> f64 {
 }
 
 impl Lambda6 {
-    /// Newton on the three circles. Returns the solution and σ, `None` if it did not converge.
+    /// Newton on the three circles. Returns the solution and σ, `None` if it did not converge; `solves` counts its steps.
     ///
     /// Source: standard Newton. Assumes all ρ > 0. Guarantee: an accepted result has |F| < 1e-10 mm. Cost: at most 16 solves
     /// and 17 evaluations.
-    pub(super) fn newton(&self, circles: &Circles, start: Planar3) -> Option<(Planar3, f64)> {
+    pub(super) fn newton(
+        &self,
+        circles: &Circles,
+        start: Planar3,
+        solves: &mut u32,
+    ) -> Option<(Planar3, f64)> {
         let mut now = start;
         for _ in 0..17 {
             let yaw = sincos(now.phi);
@@ -70,6 +75,7 @@ impl Lambda6 {
             if !(fabs(det) > 1e-9) {
                 return None;
             }
+            *solves = solves.saturating_add(1);
             // Inverse of a matrix with rows a, b, c: columns b×c, c×a, a×b over the determinant.
             let step = scale(
                 -1.0 / det,
@@ -116,7 +122,7 @@ impl Lambda6 {
     ///
     /// F(φ) is a trigonometric polynomial of degree 3: seven samples give its coefficients; 72 cells are searched for sign
     /// changes of F and, for pairs of roots within a cell, of F'. Cost: at most 72 × 3 bisections of 60 steps; always ends.
-    pub(super) fn all_solutions(&self, circles: &Circles) -> Branches<(Planar3, f64)> {
+    pub(super) fn all_solutions(&self, circles: &Circles, solves: &mut u32) -> Branches<(Planar3, f64)> {
         let mut all = Branches::new();
         let mut series = Series { mean: 0.0, harmonics: [[0.0; 2]; 3] };
         let mut sample = 0.0;
@@ -138,7 +144,7 @@ impl Lambda6 {
             if !(x.is_finite() && y.is_finite()) {
                 return;
             }
-            if let Some((mut found, sigma)) = self.newton(circles, Planar3 { x, y, phi }) {
+            if let Some((mut found, sigma)) = self.newton(circles, Planar3 { x, y, phi }, solves) {
                 found.phi = wrap(found.phi);
                 let known = |(other, _): &(Planar3, f64)| {
                     fabs(wrap(other.phi - found.phi)) < 1e-7 && fabs(other.x - found.x) < 1e-4
