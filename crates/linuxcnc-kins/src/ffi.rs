@@ -289,7 +289,9 @@ unsafe impl Sync for StringParameter {}
 
 impl StringParameter {
     /// Not set.
-    pub const UNSET: Self = Self(UnsafeCell::new(core::ptr::null()));
+    pub const fn unset() -> Self {
+        Self(UnsafeCell::new(core::ptr::null()))
+    }
 
     /// What LinuxCNC has put there.
     pub fn get(&self) -> *const c_char {
@@ -335,7 +337,7 @@ macro_rules! module {
                 Err(_) => panic!("a name has no NUL"),
             };
             static MODULE: Module<$mechanism> = Module::new(NAME);
-            static MACHINE: StringParameter = StringParameter::UNSET;
+            static MACHINE: StringParameter = StringParameter::unset();
 
             #[unsafe(no_mangle)]
             pub static rtapi_info_address_machine: Symbol = MACHINE.address();

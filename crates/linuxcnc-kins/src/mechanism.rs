@@ -2,6 +2,9 @@
 
 use pkm_kins::*;
 
+/// The machines that ship: name and geometry.
+pub type Shipped<P> = &'static [(&'static str, fn() -> P)];
+
 /// A mechanism as a LinuxCNC module.
 pub trait Mechanism: Sized {
     /// Its geometry.
@@ -17,7 +20,7 @@ pub trait Mechanism: Sized {
     /// True if [`Self::forward`] iterates: the module then has the pins `last-iterations` and `max-iterations`.
     const ITERATES: bool = false;
     /// The machines that ship, for `loadrt moma_kins machine=moma-a`. At least one.
-    const SHIPPED: &'static [(&'static str, fn() -> Self::Parameters)];
+    const SHIPPED: Shipped<Self::Parameters>;
 
     /// The mechanism with this geometry, in the state that `before` is in.
     ///
@@ -66,7 +69,7 @@ macro_rules! plain {
             const PREFIX: &'static str = $prefix;
             const DEGREES: bool = $degrees;
             const ROTARY_JOINTS: u32 = $rotary;
-            const SHIPPED: &'static [(&'static str, fn() -> $parameters)] = &[$(($name, || $value)),+];
+            const SHIPPED: Shipped<$parameters> = &[$(($name, || $value)),+];
 
             fn new(parameters: &$parameters, _: Option<&Self>) -> Result<Self, GeometryError> {
                 <$kind>::new(parameters)
@@ -126,7 +129,7 @@ impl Mechanism for Lambda6 {
     const PREFIX: &'static str = "lambda";
     const DEGREES: bool = true;
     const ITERATES: bool = true;
-    const SHIPPED: &'static [(&'static str, fn() -> Lambda6Parameters)] =
+    const SHIPPED: Shipped<Lambda6Parameters> =
         &[("lambda6", || Lambda6Set::Yaw45.into()), ("lambda6-paper", || Lambda6Set::Paper.into())];
 
     fn new(parameters: &Lambda6Parameters, _: Option<&Self>) -> Result<Self, GeometryError> {

@@ -160,7 +160,10 @@ impl<M: Mechanism> State<M> {
             Ok(machine) => self.machine = Some(machine),
             Err(why) => {
                 self.why = why;
-                self.tell(why);
+                // At load nothing is set yet.
+                if self.before.is_some() {
+                    self.tell(why);
+                }
             }
         }
     }
@@ -240,6 +243,8 @@ impl<M: Mechanism> State<M> {
         }
         match result {
             Ok(()) => 0,
+            // Before LinuxCNC knows of any joint it asks where the machine stands with all of them at 0.
+            Err(_) if joints.iter().all(|joint| *joint == 0.0) => self.count(),
             Err(error) => self.refuse_as(&error),
         }
     }
@@ -265,11 +270,16 @@ impl<M: Mechanism> State<M> {
     #[cold]
     #[inline(never)]
     fn refuse(&mut self, why: Message) -> c_int {
+        self.tell(why);
+        self.count()
+    }
+
+    #[cold]
+    fn count(&mut self) -> c_int {
         self.errors = self.errors.wrapping_add(1);
         if let Some(hal) = &self.hal {
             hal.errors.set(self.errors);
         }
-        self.tell(why);
         -1
     }
 

@@ -3,7 +3,7 @@
 //! LinuxCNC switches between two servo periods: it calls `kinematicsSwitch`, then forward for the joints where they stand. The
 //! task must be brought to rest first (`M66 E0 L0`); `pkm linuxcnc` writes M codes that do it.
 
-use crate::mechanism::{Mechanism, SwitchError};
+use crate::mechanism::{Mechanism, Shipped, SwitchError};
 use crate::module::QUIET;
 use pkm_kins::*;
 
@@ -35,7 +35,7 @@ impl Mechanism for HvMachineKins {
     const DEGREES: bool = true;
     const ROTARY_JOINTS: u32 = 0b110_0000;
     const TYPES: i32 = 2;
-    const SHIPPED: &'static [(&'static str, fn() -> HvMachineParameters)] =
+    const SHIPPED: Shipped<HvMachineParameters> =
         &[("hv-mill-7", HvMachineParameters::seven), ("hv-mill-6", HvMachineParameters::six)];
 
     fn new(parameters: &HvMachineParameters, before: Option<&Self>) -> Result<Self, GeometryError> {
@@ -132,7 +132,7 @@ impl Mechanism for OxGlideKins {
     const PREFIX: &'static str = "ox-glide";
     const DEGREES: bool = false;
     const TYPES: i32 = 3;
-    const SHIPPED: &'static [(&'static str, fn() -> OxGlideParameters)] =
+    const SHIPPED: Shipped<OxGlideParameters> =
         &[("ox-glide-o", || OxForm::O.into()), ("ox-glide-x", || OxForm::X.into())];
 
     fn new(parameters: &OxGlideParameters, before: Option<&Self>) -> Result<Self, GeometryError> {

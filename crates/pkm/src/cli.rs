@@ -54,6 +54,10 @@ pub(crate) enum Command {
     Steps(Steps),
     /// List the machines that ship, or print one annotated machine file
     Machines(Machines),
+    /// Write a complete LinuxCNC configuration for a machine: INI, HAL, geometry, tool table, example program, README
+    Linuxcnc(Linuxcnc),
+    /// Read limits, scales, periods, step timing and geometry of a LinuxCNC configuration into a machine file
+    ImportLinuxcnc(ImportLinuxcnc),
     /// Write the man page or shell completions to standard output
     Generate(Generate),
 }
@@ -68,7 +72,12 @@ impl Command {
             Self::Run(arguments) => &arguments.program.machine.set,
             Self::Check(arguments) => &arguments.program.machine.set,
             Self::Plan(arguments) => &arguments.program.machine.set,
-            Self::Canon(_) | Self::Steps(_) | Self::Machines(_) | Self::Generate(_) => &[],
+            Self::Linuxcnc(arguments) => &arguments.machine.set,
+            Self::Canon(_)
+            | Self::Steps(_)
+            | Self::Machines(_)
+            | Self::ImportLinuxcnc(_)
+            | Self::Generate(_) => &[],
         }
     }
 }
@@ -300,6 +309,27 @@ pub(crate) struct Machines {
     /// How the list is printed
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Linuxcnc {
+    #[command(flatten)]
+    pub machine: MachineArgs,
+    /// Write the configuration into this folder
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The built kinematics module, to be copied into the folder; default: where cargo leaves it, if it is there
+    #[arg(long, value_name = "FILE")]
+    pub module: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ImportLinuxcnc {
+    /// INI file of the configuration; its HAL files are read too
+    pub ini: PathBuf,
+    /// Write the machine file here instead of to standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

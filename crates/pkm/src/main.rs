@@ -21,6 +21,8 @@ fn main() -> ExitCode {
         cli::Command::Kins(command) => commands::kins::run(command),
         cli::Command::Steps(arguments) => commands::steps::run(arguments),
         cli::Command::Machines(arguments) => commands::machines::run(arguments),
+        cli::Command::Linuxcnc(arguments) => commands::linuxcnc::run(arguments, &messages),
+        cli::Command::ImportLinuxcnc(arguments) => commands::import_linuxcnc::run(arguments, &messages),
         cli::Command::Generate(arguments) => commands::generate::run(arguments),
     };
     match result {

@@ -1,0 +1,16 @@
+#!/usr/bin/python3
+"""program.py PROGRAM: home, run, record every servo period into rows.csv, end where the program ends (M2)."""
+from session import *
+
+program = os.path.abspath(arguments[0])
+home()
+record = Record()
+run(program, record)
+record.save("rows.csv")
+if messages:
+    fail("messages during the program")
+if status.task_state != linuxcnc.STATE_ON:
+    fail("the machine is off after the program")
+with open("end.txt", "w") as file:
+    file.write(" ".join(map(repr, status.actual_position)) + "\n")
+say("OK rows=%d" % len(record.rows))
