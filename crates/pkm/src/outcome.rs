@@ -38,20 +38,30 @@ pub(crate) enum Failure {
     CouldNot(Vec<Diagnostic>),
 }
 
+/// A message about a file as a whole.
+fn about(severity: Severity, code: &str, file: &str, message: String, help: &str) -> Diagnostic {
+    Diagnostic {
+        code: code.into(),
+        severity,
+        message,
+        help: (!help.is_empty()).then(|| help.into()),
+        file: file.into(),
+        line: 0,
+        column: 0,
+        end_column: 0,
+        notes: Vec::new(),
+    }
+}
+
+/// A warning about a file as a whole.
+pub(crate) fn warning(code: &str, file: &str, message: String, help: &str) -> Diagnostic {
+    about(Severity::Warning, code, file, message, help)
+}
+
 impl Failure {
     /// Exit 2 with one message.
     pub(crate) fn could_not(code: &str, file: &str, message: String, help: &str) -> Self {
-        Self::CouldNot(vec![Diagnostic {
-            code: code.into(),
-            severity: Severity::Error,
-            message,
-            help: (!help.is_empty()).then(|| help.into()),
-            file: file.into(),
-            line: 0,
-            column: 0,
-            end_column: 0,
-            notes: Vec::new(),
-        }])
+        Self::CouldNot(vec![about(Severity::Error, code, file, message, help)])
     }
 
     /// Prints the messages to standard error.

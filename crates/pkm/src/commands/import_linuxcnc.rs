@@ -1,10 +1,10 @@
 //! `pkm import-linuxcnc`: a machine file from a LinuxCNC configuration.
 
 use crate::cli::ImportLinuxcnc;
-use crate::outcome::{Failure, Outcome};
+use crate::outcome::{Failure, Outcome, warning};
 use crate::output::Folder;
 use crate::render::diagnostics::Messages;
-use pkm_canon::diagnostic::{Diagnostic, Severity};
+use pkm_canon::diagnostic::Diagnostic;
 use pkm_machine::Machine;
 use std::ffi::OsStr;
 use std::io::{Read, Write};
@@ -26,16 +26,7 @@ pub(crate) fn run(arguments: &ImportLinuxcnc, messages: &Messages) -> Result<Out
     let remarks: Vec<Diagnostic> = imported
         .remarks
         .iter()
-        .map(|remark| Diagnostic {
-            code: "linuxcnc-missing".into(),
-            severity: Severity::Warning,
-            message: remark.clone(),
-            help: None,
-            file: shown.clone(),
-            line: 0,
-            column: 0,
-            end_column: 0,
-        })
+        .map(|remark| warning("linuxcnc-missing", &shown, remark.clone(), ""))
         .collect();
     messages.print(&remarks);
     match &arguments.output {

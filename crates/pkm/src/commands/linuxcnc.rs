@@ -1,10 +1,9 @@
 //! `pkm linuxcnc`: a complete LinuxCNC configuration for a machine.
 
 use crate::cli::Linuxcnc;
-use crate::outcome::{Failure, Outcome};
+use crate::outcome::{Failure, Outcome, warning};
 use crate::output::{Folder, failure};
 use crate::render::diagnostics::Messages;
-use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_linuxcnc::Module;
 use pkm_machine::{Machine, MachineFile};
 use std::io::Write;
@@ -66,18 +65,14 @@ pub(crate) fn run(arguments: &Linuxcnc, messages: &Messages) -> Result<Outcome, 
             let so = arguments.out.join(format!("{}.so", module.name));
             writeln!(out, "{}", so.display())?;
         }
-        (Some(module), None) => messages.print(&[Diagnostic {
-            code: "linuxcnc-module".into(),
-            severity: Severity::Warning,
-            message: format!("the kinematics module {} is not built yet, the rest is complete", module.name),
-            help: Some(format!(
-                "in the pkm repository: {BUILD}; then this command again, or as README.md says"
-            )),
-            file: arguments.out.display().to_string(),
-            line: 0,
-            column: 0,
-            end_column: 0,
-        }]),
+        (Some(module), None) => {
+            let message =
+                format!("the kinematics module {} is not built yet, the rest is complete", module.name);
+            let help =
+                format!("in the pkm repository: {BUILD}; then this command again, or as README.md says");
+            let folder = arguments.out.display().to_string();
+            messages.print(&[warning("linuxcnc-module", &folder, message, &help)]);
+        }
         (None, _) => {}
     }
     Ok(Outcome::Clean)
