@@ -2,7 +2,7 @@
 
 use crate::error::{Code, Error, ErrorKind};
 use crate::interpreter::Interpreter;
-use crate::modal::{GGroup, MGroup};
+use crate::modal::GGroup;
 use crate::source::LineSource;
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -107,14 +107,21 @@ fn meant(error: &Error, line: &[u8], names: &Names) -> Option<String> {
     let help = error.kind.help();
     let did_you_mean = |found: Option<String>| found.map(|found| format!("did you mean {found}? ({help})"));
     match error.kind {
+        // GO for G0.
+        ErrorKind::ExprFunction if word.starts_with(['o', 'O']) && ends_with_letter(&line[..start]) => {
+            Some("did you mean the digit 0? this is the letter O".to_string())
+        }
         ErrorKind::ExprFunction => did_you_mean(nearest(&word, FUNCTIONS)),
+        ErrorKind::ExprOperator if word.eq_ignore_ascii_case("e") && ends_with_digit(&line[..start]) => {
+            Some(NO_EXPONENT.to_string())
+        }
         ErrorKind::ExprOperator => {
             let letters: String =
                 text(&line[start..]).chars().take_while(char::is_ascii_alphabetic).collect();
             did_you_mean(nearest(&letters, OPERATORS))
         }
         ErrorKind::OUnknown => did_you_mean(nearest(&word, KEYWORDS)),
-        ErrorKind::ParamUndefined => {
+        ErrorKind::ParamUndefined | ErrorKind::ParamNever => {
             let name = word.strip_prefix("#<")?.strip_suffix('>')?;
             if names.parameters.contains(&name.to_ascii_lowercase()) {
                 return Some(format!(
@@ -126,10 +133,9 @@ fn meant(error: &Error, line: &[u8], names: &Names) -> Option<String> {
         }
         ErrorKind::ONotFound => {
             let label = names.missing.as_ref()?;
-            did_you_mean(nearest(label, &names.labels).map(|name| match name.parse::<u32>() {
-                Ok(number) => format!("o{number}"),
-                Err(_) => format!("o<{name}>"),
-            }))
+            // One number is as near as another.
+            let named = names.labels.iter().filter(|label| !label.bytes().all(|b| b.is_ascii_digit()));
+            did_you_mean(nearest(label, named).map(|name| format!("o<{name}>")))
         }
         ErrorKind::GUnknown { code: Code(code) } => {
             let base = code - code % 10;
@@ -139,14 +145,17 @@ fn meant(error: &Error, line: &[u8], names: &Names) -> Option<String> {
                 .collect();
             (!known.is_empty()).then(|| format!("there is {}", known.join(", ")))
         }
-        ErrorKind::MUnknown { number } if number > 199 && MGroup::of(number % 100).is_some() => {
-            Some(format!("only a machine file can give M{number} a meaning; there is M{}", number % 100))
+        ErrorKind::MUnknown { number } | ErrorKind::MUnsupported { number }
+            if pkm_canon::MACHINE_CODES.contains(&number) =>
+        {
+            Some(format!("only a machine file can give M{number} a meaning: name one that does (--machine)"))
         }
         // An exponent: the E was read as a word of its own, or left without a number.
-        ErrorKind::WordUnused { letter: 'E', .. }
-            if line[..start].last().is_some_and(|byte| byte.is_ascii_digit() || *byte == b'.') =>
-        {
-            Some("numbers have no exponent: write 1000 for 1e3".to_string())
+        ErrorKind::WordUnused { letter: 'E', .. } if ends_with_digit(&line[..start]) => {
+            Some(NO_EXPONENT.to_string())
+        }
+        ErrorKind::BadLetter { letter: 'O' | 'o' } if ends_with_digit(&line[..start]) => {
+            Some("did you mean the digit 0? this is the letter O".to_string())
         }
         ErrorKind::NumberMissing => {
             let digit = match line.get(start)? {
@@ -159,6 +168,16 @@ fn meant(error: &Error, line: &[u8], names: &Names) -> Option<String> {
         }
         _ => None,
     }
+}
+
+const NO_EXPONENT: &str = "numbers have no exponent: write 1000 for 1e3";
+
+fn ends_with_digit(text: &[u8]) -> bool {
+    text.last().is_some_and(|byte| byte.is_ascii_digit() || *byte == b'.')
+}
+
+fn ends_with_letter(text: &[u8]) -> bool {
+    text.last().is_some_and(u8::is_ascii_alphabetic)
 }
 
 /// The known word that is nearest, if few letters differ: one in a word of up to four, else two.

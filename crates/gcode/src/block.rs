@@ -474,6 +474,8 @@ pub(crate) struct Reader {
     pub(crate) diameter: bool,
     pub(crate) spindles: u8,
     pub(crate) machine_codes: MachineCodes,
+    /// The largest number of an axis word (promise P5).
+    pub(crate) largest: f64,
 }
 
 impl Reader {
@@ -492,6 +494,9 @@ impl Reader {
             }
             b'L' if value < 0.0 => Err(ErrorKind::NegativeWord { letter: letter.into(), value }),
             b'H' if value < -1.0 => Err(ErrorKind::NegativeWord { letter: letter.into(), value }),
+            _ if value.abs() > self.largest && AXIS_LETTERS.contains(&letter) => {
+                Err(ErrorKind::NumberTooLarge { value, limit: self.largest })
+            }
             b'X' if self.diameter => Ok(value / 2.0),
             _ => Ok(value),
         }

@@ -130,6 +130,9 @@ errors! {
     ParameterFileCut "param-file" "the file is not whole" "restore it from its .bak; without a file all parameters begin at 0";
     ParameterFileLine "param-file" "not a parameter and its value" "write a number and a value, such as 5221 12.5";
     ParameterFileOrder { index: i32, last: i32 } "param-file" "parameter {index} comes after {last}" "numbers must rise";
+    ParamNever "param-undefined" "nothing gives this parameter a value" "assign to it first, or test it with EXISTS[#<name>]";
+    ParamUnset { index: i32 } "param-unset" "#{index} is read, but nothing sets it: it is 0" "set it first, or check the number";
+    ParamNames { limit: u32 } "param-count" "more than {limit} named parameters" "use numbered parameters";
     EqualMissing "param-equal" "'=' is missing in a parameter setting" "write #1 = 2";
     TooManySettings { limit: u8 } "param-count" "more than {limit} parameter settings in one block" "split the block";
     ExprUnclosed "expr-unclosed" "the bracket is not closed" "add ']'";
@@ -153,7 +156,7 @@ errors! {
     OTrailing "o-trailing" "text after the o-word" "put it on a line of its own";
     OLabelDuplicate "o-label-duplicate" "the label is used by another o-word at another line" "give each construct its own label";
     OLabelUnknown "o-label-unknown" "no open construct has this label" "use the label of the if, while, do or repeat it belongs to";
-    OUnclosed "o-label-unknown" "the construct that begins here is not closed" "add its end: endif, endwhile, while, endrepeat or endsub";
+    OUnclosed "o-unclosed" "the construct that begins here is not closed" "add its end: endif, endwhile, while, endrepeat or endsub";
     ONestedSub "o-nested-sub" "a sub inside a sub" "end the first sub before the next begins";
     ORedefinedSub "o-redefined-sub" "this sub is defined already" "give it another label";
     ONotInSub "o-not-in-sub" "this o-word belongs inside a sub" "call it between sub and endsub";
@@ -163,8 +166,28 @@ errors! {
     OStyle "o-style" "o-word subs and Fanuc programs do not mix" "use M98 and M99, or o call and endsub";
     ONoMemory "o-memory" "o-words need an interpreter with memory (feature alloc)" "unroll the program";
     M98NoP "m98-no-p" "M98 without P" "P is the number of the program to call";
-    EndlessLoop { blocks: u64 } "endless-loop" "{blocks} blocks without motion, dwell or input" "the loop does not end: check its condition, or raise the limit";
-    TooManyBlocks { limit: u64 } "too-many-blocks" "more than {limit} blocks executed" "raise the limit if the program is meant to run that long";
+    ONesting { limit: u8 } "o-nesting" "branches and loops nest deeper than {limit}" "put the inner ones into a sub";
+    OTooMany { limit: u32 } "o-count" "more than {limit} different labels" "use labels again: each sub has its own";
+    OUnused "o-unused" "this sub is never called" "call it, or remove it";
+    LoopAlways "endless-loop" "nothing ends this loop: its condition is always true" "add a break, or a condition that changes";
+    LoopUnchanged "endless-loop" "nothing in this loop changes what its condition reads" "change it in the loop, or add a break";
+    EndlessLoop { blocks: u64 } "endless-loop" "{blocks} blocks without motion, dwell or input" "the loop does not end: check its condition, or raise --max-blocks";
+    TooManyBlocks { limit: u64 } "too-many-blocks" "loops and subs have executed more than {limit} blocks" "check the condition of this loop, or raise --max-blocks";
+    // Read otherwise than meant (static check).
+    BlankInside "blank-inside" "blanks are ignored, so this reads as one number or name" "write it without blanks, or add the letter that is missing";
+    PowerSign "power-sign" "the sign belongs to the number: -2**2 is 4" "write -[2**2] or [-2]**2";
+    PowerChain "power-chain" "powers are taken from left to right: 2**3**2 is 64" "write brackets: 2**[3**2]";
+    CommentInactive "comment-inactive" "behind ';' this text does nothing" "write it in parentheses";
+    CommentSeveral "comment-several" "LinuxCNC acts only on the last comment of a line; here each one acts" "write one comment a line";
+    // Run from line.
+    StartInSub { line: u32 } "start-line" "line {line} is inside a sub or a subroutine's program" "begin at the line that calls it";
+    StartInConstruct { line: u32 } "start-line" "line {line} is inside a branch or loop" "begin at the line where the outermost one begins";
+    StartPastEnd { line: u32 } "start-line" "the program has no line {line} that is run" "begin at an earlier line";
+    StartCompensation { line: u32 } "start-line" "cutter compensation is on at line {line}" "begin before G41 or G42, or after G40";
+    StartSpline { line: u32 } "start-line" "line {line} is inside a spline" "begin before G5.2";
+    StartIncremental "start-line" "the first move is incremental (G91): it would begin where the machine stands" "begin at a line with G90";
+    StartArc "start-line" "the first move is an arc: it would begin where the machine stands" "begin at a straight move";
+    StartUnknown "start-line" "what follows this block depends on what the machine did in it" "begin at this line or before it";
     // Feed, speed, spindle.
     FeedZero { code: Code } "feed-zero" "G{code} with feed 0" "set F first (G93, G94 and G95 make F unset)";
     FeedMissingG93 { code: Code } "feed-missing-g93" "G{code} without F in inverse time mode (G93)" "in G93 each move needs its own F";

@@ -45,6 +45,8 @@ mod parameters;
 mod settings;
 mod simulation;
 mod source;
+#[cfg(feature = "std")]
+mod static_check;
 mod tool_table;
 
 pub use error::{Code, Error, ErrorKind};
@@ -57,4 +59,6 @@ pub use simulation::{SimulatedMachine, canon_text, canon_text_of};
 #[cfg(feature = "std")]
 pub use source::FileSource;
 pub use source::{LineSource, MAX_LINE, MemorySource, Place, SourceError};
+#[cfg(feature = "std")]
+pub use static_check::static_check;
 pub use tool_table::{MAX_TOOLS, ToolTable};

@@ -45,6 +45,10 @@ pub(crate) const fn is_persistent(index: i32) -> bool {
 #[cfg(feature = "alloc")]
 pub(crate) const ARGUMENTS: usize = 30;
 
+/// Most different names of parameters (promise P5).
+#[cfg(feature = "alloc")]
+const MOST_NAMES: u32 = 100_000;
+
 /// All parameters of a program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
@@ -80,24 +84,28 @@ impl Named {
         self.present().iter().find(|(known, _)| known == id).map(|(_, value)| *value)
     }
 
-    fn set(&mut self, name: &[u8], value: f64) {
+    fn set(&mut self, name: &[u8], value: f64) -> Result<(), ErrorKind> {
         let id = match self.names.get(name) {
             Some(id) => *id,
             None => {
                 let id = self.names.len() as u32;
+                if id >= MOST_NAMES {
+                    return Err(ErrorKind::ParamNames { limit: MOST_NAMES });
+                }
                 self.names.insert(name.into(), id);
                 id
             }
         };
         if name.first() == Some(&b'_') {
             self.globals.insert(id, value);
-            return;
+            return Ok(());
         }
         let first = self.frames.last().copied().unwrap_or(0);
         match self.locals[first..].iter_mut().find(|(known, _)| *known == id) {
             Some(place) => place.1 = value,
             None => self.locals.push((id, value)),
         }
+        Ok(())
     }
 }
 
@@ -158,8 +166,7 @@ impl Parameters {
     /// Sets or creates `#<name>`.
     #[cfg(feature = "alloc")]
     pub(crate) fn set_named(&mut self, name: &[u8], value: f64) -> Result<(), ErrorKind> {
-        self.named.set(name, value);
-        Ok(())
+        self.named.set(name, value)
     }
 
     #[cfg(not(feature = "alloc"))]

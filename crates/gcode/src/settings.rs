@@ -101,6 +101,11 @@ impl Settings {
         }
     }
 
+    /// The largest number of an axis word; LinuxCNC takes any.
+    pub(crate) fn largest_number(&self) -> f64 {
+        if self.dialect == Dialect::Pkm { 1e9 } else { f64::INFINITY }
+    }
+
     /// Program units of a length in machine units.
     pub(crate) fn program_length(&self, length: f64, units: LengthUnit) -> f64 {
         let mm = length / self.machine_units_per_mm;

@@ -27,7 +27,7 @@ fn codes(text: &[u8]) -> Vec<&'static str> {
     let mut interpreter = Interpreter::new(settings);
     let mut source = MemorySource::new(text);
     let mut codes = Vec::new();
-    for _ in 0..100_000 {
+    for _ in 0..1_000_000 {
         match interpreter.step(&mut source, &mut Finite) {
             Ok(Status::Ended) => return codes,
             Ok(_) => {}
@@ -76,8 +76,9 @@ fn known_nasties() {
     {
         assert_eq!(codes(text.as_bytes()), Vec::<&str>::new(), "{text:?}");
     }
-    // 200 nines are a number; 400 would be infinite, but the line is at its limit before.
-    assert_eq!(codes(format!("G0 X{}\nM2", "9".repeat(200)).as_bytes()), Vec::<&str>::new());
+    // 200 nines are a number, but no machine goes there; 400 would be infinite, but the line is at its limit before.
+    assert_eq!(codes(format!("G0 X{}\nM2", "9".repeat(200)).as_bytes()), ["number-range"]);
+    assert_eq!(codes(format!("F{}\nM2", "9".repeat(200)).as_bytes()), Vec::<&str>::new());
 }
 
 #[test]
@@ -110,4 +111,21 @@ fn catalogue_is_whole() {
         assert!(!message.is_empty());
         assert!(code.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-'), "{code}");
     }
+}
+
+/// Labels and names are bounded: memory does not grow with the length of a program.
+#[test]
+fn labels_and_names_are_bounded() {
+    let many = |line: fn(u32) -> String| (0..100_100).map(line).collect::<String>();
+    let labels = many(|i| format!("o{i} if [1]\no{i} endif\n"));
+    assert_eq!(codes(labels.as_bytes()).first(), Some(&"o-count"));
+    let names = many(|i| format!("#<a{i}>=1\n"));
+    assert_eq!(codes(names.as_bytes()).first(), Some(&"param-count"));
+}
+
+/// A program that is long is not endless.
+#[test]
+fn lines_that_run_once_do_not_count_as_executed_blocks() {
+    let long = format!("{}M2\n", "#31=1\n".repeat(60_000));
+    assert_eq!(codes(long.as_bytes()), Vec::<&str>::new());
 }

@@ -41,7 +41,7 @@ pub(crate) enum Format {
 pub(crate) enum Command {
     /// Run a program on the simulated machine: summary, trace, step pulses
     Run(Run),
-    /// Everything that can be said before cutting, without producing pulses
+    /// Everything that can be said before cutting, without producing pulses; without --machine: the language alone
     Check(Check),
     /// How long every block takes and what limits it: feed, which joint, corners
     Plan(Plan),
@@ -93,13 +93,24 @@ pub(crate) struct MachineArgs {
     pub set: Vec<String>,
 }
 
+/// The machine that a program is for; only `check` can do without.
+#[derive(Debug, Args)]
+pub(crate) struct ProgramMachineArgs {
+    /// Machine file, or the name of a shipped machine (see `pkm machines`)
+    #[arg(long, value_name = "FILE")]
+    pub machine: Option<String>,
+    /// Override a key of the machine file, e.g. 'joint.*.max_velocity_mm_s=100'; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE", requires = "machine")]
+    pub set: Vec<String>,
+}
+
 /// A program on a machine.
 #[derive(Debug, Args)]
 pub(crate) struct ProgramArgs {
     /// G-code program; `-` is standard input
     pub program: PathBuf,
     #[command(flatten)]
-    pub machine: MachineArgs,
+    pub machine: ProgramMachineArgs,
     /// Where the machine stands when the program begins, e.g. "X0 Y-260" (mm, degrees); default: its home pose
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pub start: Option<String>,
@@ -113,12 +124,26 @@ pub(crate) struct ProgramArgs {
     /// Skip the lines that begin with `/`
     #[arg(long)]
     pub block_delete: bool,
+    #[command(flatten)]
+    pub bounds: Bounds,
     /// How the result is printed
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
 }
 
+/// Where a program begins and when it has run for too long.
 #[derive(Debug, Args)]
+pub(crate) struct Bounds {
+    /// Begin at this line: the lines before it set modes, offsets, tool and parameters, but move nothing
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub start_line: Option<u32>,
+    /// A program whose loops and subs execute more blocks than this counts as endless; 0 = no limit
+    #[arg(long, value_name = "N", default_value_t = 10_000_000)]
+    pub max_blocks: u64,
+}
+
+#[derive(Debug, Args)]
+#[command(mut_arg("machine", |machine| machine.required(true)))]
 pub(crate) struct Run {
     #[command(flatten)]
     pub program: ProgramArgs,
@@ -170,6 +195,7 @@ pub(crate) struct Check {
 }
 
 #[derive(Debug, Args)]
+#[command(mut_arg("machine", |machine| machine.required(true)))]
 pub(crate) struct Plan {
     #[command(flatten)]
     pub program: ProgramArgs,
@@ -210,6 +236,8 @@ pub(crate) struct Canon {
     /// Skip the lines that begin with `/`
     #[arg(long)]
     pub block_delete: bool,
+    #[command(flatten)]
+    pub bounds: Bounds,
     /// What to do after an error
     #[arg(long, value_enum, default_value_t = OnError::Stop)]
     pub on_error: OnError,

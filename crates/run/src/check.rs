@@ -3,13 +3,13 @@
 //! Nothing is planned here: every programmed move is sampled closely along its whole length. All findings are
 //! reported (one a block and kind), not only the first.
 
-use crate::feeder::{Events, face, frame, inside, interpreter};
+use crate::feeder::{Events, face, frame, inside, interpreter, settings, skip_to_line};
 use crate::program::Program;
 use crate::switch::switched;
 use crate::{Options, messages};
 use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
-use pkm_gcode::Status;
+use pkm_gcode::{Settings, Status};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{JointRange, Joints, Kinematics, Pose};
 use pkm_machine::Machine;
@@ -40,6 +40,36 @@ impl Checked {
     /// True if a finding forbids to run the program.
     pub fn has_errors(&self) -> bool {
         self.diagnostics.iter().any(|d| d.severity == Severity::Error)
+    }
+
+    /// More is not worth looking for.
+    pub(crate) fn is_full(&self) -> bool {
+        self.diagnostics.len() > MOST_FINDINGS
+    }
+
+    /// What reading finds without running: an error is left out where the run has found one in the same line.
+    pub(crate) fn add_static(
+        &mut self,
+        program: &Program,
+        settings: &Settings,
+        options: &Options,
+    ) -> Result<(), Diagnostic> {
+        let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
+        let found = pkm_gcode::static_check(&mut *source, settings, options.parameters, &program.name());
+        for finding in found {
+            let same_line = |b: &&mut Diagnostic| {
+                b.severity == Severity::Error && (finding.line, &finding.file) == (b.line, &b.file)
+            };
+            let told = self.diagnostics.iter_mut().find(same_line);
+            match told.filter(|_| finding.severity == Severity::Error) {
+                None => self.add(program, finding),
+                // Why a loop does not end says more than that it has not ended.
+                Some(told) if finding.code == "endless-loop" => *told = finding,
+                Some(told) if told.code == finding.code => told.notes.extend(finding.notes),
+                Some(_) => {}
+            }
+        }
+        Ok(())
     }
 
     /// In the order a person reads: the program's own lines, then those of its subroutine files. What is about no line
@@ -73,6 +103,7 @@ impl Checked {
 /// The program cannot be read.
 pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<Checked, Diagnostic> {
     let mut checked = interpret(program, machine, options)?;
+    checked.add_static(program, &settings(Some(machine), options), options)?;
     checked.sort(program);
     Ok(checked)
 }
@@ -94,13 +125,20 @@ fn interpret(program: &Program, machine: &Machine, options: &Options) -> Result<
     let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
     let mut frame = frame(machine, &start);
     let mut queue = VecDeque::new();
+    let mut sink = Events { frame: &mut frame, queue: &mut queue };
+    if let Err(finding) = skip_to_line(&mut interpreter, program, &mut *source, options, &start, &mut sink) {
+        checked.add(program, finding);
+        return Ok(checked);
+    }
+    queue.clear();
+    let mut approaches = options.start_line.is_some();
     loop {
         let mut sink = Events { frame: &mut frame, queue: &mut queue };
         let stepped = interpreter.step(&mut *source, &mut sink);
         if let Err(error) = &stepped {
             let finding = interpreter.diagnose(error, &*source, &program.name());
             checked.add(program, finding);
-            if checked.diagnostics.len() > MOST_FINDINGS || interpreter.has_ended() {
+            if checked.is_full() || interpreter.has_ended() {
                 return Ok(checked);
             }
             // A block at fault moves nothing, but what it sets and where it leads holds for the blocks behind it.
@@ -122,6 +160,9 @@ fn interpret(program: &Program, machine: &Machine, options: &Options) -> Result<
             match event {
                 Event::Move(step) => {
                     checked.moves += 1;
+                    if core::mem::take(&mut approaches) {
+                        findings.push(messages::approach(program, machine, span, &start));
+                    }
                     check_move(program, machine, &mechanism, &step, span, &mut findings);
                 }
                 Event::Unsupported(what) => findings.push(messages::unsupported(program, span, what)),

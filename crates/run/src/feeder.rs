@@ -29,16 +29,26 @@ const SMOOTHER: usize = 640;
 /// Tolerance of a blend in rotary coordinates, rad (0.01°): G64 P speaks of lengths.
 const BLEND_RAD: f64 = 0.01 / 180.0 * maths::PI;
 
-/// What the interpreter needs to know of a machine.
-pub(crate) fn interpreter(machine: &Machine, options: &Options, start: &Pose) -> Interpreter {
+/// What the interpreter needs to know of a machine; all axes and no codes of its own without one.
+pub(crate) fn settings(machine: Option<&Machine>, options: &Options) -> Settings {
+    let common = Settings {
+        block_delete: options.block_delete,
+        max_blocks: options.max_blocks,
+        max_idle_blocks: options.max_blocks,
+        ..Settings::default()
+    };
+    let Some(machine) = machine else { return common };
     let codes: Vec<i32> = machine.switches.iter().map(|switch| switch.code).collect();
-    let settings = Settings {
+    Settings {
         // A machine has no more codes than the interpreter takes.
         machine_codes: MachineCodes::new(&codes).unwrap_or_default(),
         axes: machine.mechanism.axes(),
-        block_delete: options.block_delete,
-        ..Settings::default()
-    };
+        ..common
+    }
+}
+
+/// An interpreter with tools and parameters as the caller gave them.
+pub(crate) fn prepared(settings: Settings, options: &Options) -> Interpreter {
     let mut interpreter = Interpreter::new(settings);
     if let Some(tools) = options.tools {
         interpreter.tools_mut().clone_from(tools);
@@ -46,8 +56,31 @@ pub(crate) fn interpreter(machine: &Machine, options: &Options, start: &Pose) ->
     if let Some(parameters) = options.parameters {
         interpreter.parameters_mut().clone_from(parameters);
     }
+    interpreter
+}
+
+/// The interpreter of a machine that stands at `start`.
+pub(crate) fn interpreter(machine: &Machine, options: &Options, start: &Pose) -> Interpreter {
+    let mut interpreter = prepared(settings(Some(machine), options), options);
     interpreter.set_machine_position_mm(face(&start.to_array()));
     interpreter
+}
+
+/// Goes to the line that the options ask for; the machine stays where it stands.
+pub(crate) fn skip_to_line(
+    interpreter: &mut Interpreter,
+    program: &Program,
+    source: &mut dyn LineSource,
+    options: &Options,
+    start: &Pose,
+    sink: &mut dyn CanonSink,
+) -> Result<(), Diagnostic> {
+    let Some(line) = options.start_line else { return Ok(()) };
+    interpreter
+        .skip_to_line(line, source, sink)
+        .map_err(|error| interpreter.diagnose(&error, source, &program.name()))?;
+    interpreter.begin_elsewhere(face(&start.to_array()));
+    Ok(())
 }
 
 /// mm and degrees.
@@ -177,13 +210,17 @@ impl<'a> Feeder<'a> {
         let window = machine.path.smoothing_periods as usize * options.substeps.max(1) as usize;
         let setpoint = *planner.setpoint();
         let smoother = (window > 1).then(|| Box::new(Smoother::new(window, setpoint.joints)));
-        let source = program.open().map_err(|e| messages::unreadable(program, &e))?;
+        let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
+        let mut interpreter = interpreter(machine, options, &start);
+        let (mut frame, mut queue) = (frame(machine, &start), VecDeque::new());
+        let mut sink = Events { frame: &mut frame, queue: &mut queue };
+        skip_to_line(&mut interpreter, program, &mut *source, options, &start, &mut sink)?;
         Ok(Self {
             program,
             machine,
-            interpreter: interpreter(machine, options, &start),
+            interpreter,
             source,
-            frame: frame(machine, &start),
+            frame,
             planner,
             mechanism: machine.mechanism,
             code: None,
@@ -195,7 +232,7 @@ impl<'a> Feeder<'a> {
             late: VecDeque::new(),
             delay: window / 2,
             setpoint,
-            queue: VecDeque::new(),
+            queue,
             merger: Merger::default(),
             merged: VecDeque::new(),
             program_ended: false,

@@ -8,6 +8,7 @@ mod check;
 mod controller;
 mod deviation;
 mod feeder;
+mod language;
 mod messages;
 mod plan;
 mod program;
@@ -17,6 +18,7 @@ mod switch;
 mod wiring;
 
 pub use check::{Checked, check};
+pub use language::check_language;
 pub use pkm_analysis::outcome::{Objection, Outcome};
 pub use plan::{BlockPlan, Plan, Shares, plan};
 pub use program::Program;
@@ -45,6 +47,10 @@ pub struct Options {
     pub max_ticks: u64,
     /// `/` lines are skipped.
     pub block_delete: bool,
+    /// The program begins at this line, counted from 1, with the state that the lines before it leave.
+    pub start_line: Option<u32>,
+    /// The most blocks that loops and subs may execute before the program counts as endless; 0 = no limit.
+    pub max_blocks: u64,
     /// The tools of the machine; none without it. Read once for the life of the process.
     pub tools: Option<&'static ToolTable>,
     /// The machine begins without knowing where it is, and homes first; the program begins at its home pose.
@@ -63,6 +69,8 @@ impl Default for Options {
             substeps: 1,
             max_ticks: 100_000_000,
             block_delete: false,
+            start_line: None,
+            max_blocks: 10_000_000,
             tools: None,
             home: false,
             faults: &[],

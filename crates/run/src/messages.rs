@@ -265,6 +265,14 @@ pub(crate) fn switch(
     at(program, span, &refusal.code, Severity::Error, message, help)
 }
 
+/// The first move of a run that does not begin at the first line.
+pub(crate) fn approach(program: &Program, machine: &Machine, span: Span, start: &Pose) -> Diagnostic {
+    let message =
+        format!("the first move goes straight from where the machine stands, {}", place(machine, start));
+    let help = "see that nothing is in the way: jog nearer, or begin at a line that retracts first";
+    at(program, span, "start-line", Severity::Note, message, help)
+}
+
 /// What a form switch means.
 pub(crate) fn form_switch(program: &Program, span: Span) -> Diagnostic {
     let message = "on the way to the other form the platform passes c = 0, where it is not held".to_owned();

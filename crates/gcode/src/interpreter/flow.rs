@@ -23,6 +23,9 @@ use pkm_canon::Span;
 /// Deepest nesting of calls (LinuxCNC: ten levels with the main program).
 const MAX_CALLS: usize = 9;
 
+/// Most different labels (promise P5).
+const MOST_LABELS: u32 = 100_000;
+
 /// A label, numbered in the order of first appearance.
 type Label = u32;
 
@@ -84,6 +87,8 @@ pub(crate) struct Flow {
     text: LabelText,
     /// The o-word of the line being executed, for recovery.
     current: Option<(Name, Option<Keyword>, Span)>,
+    /// The loop that went round last.
+    last_loop: Option<Span>,
     /// Labels of o-words that were wrong: what else is said about them only follows.
     wrong: Vec<Label>,
 }
@@ -105,6 +110,11 @@ impl Flow {
     /// Open calls.
     pub(crate) fn depth(&self) -> usize {
         self.frames.len()
+    }
+
+    /// The loop that went round last, for the message about one that does not end.
+    pub(crate) fn last_loop(&self) -> Option<Span> {
+        self.last_loop
     }
 
     /// The open calls, innermost first.
@@ -179,6 +189,9 @@ impl Interpreter {
             keyword = Some(Keyword::Call);
         }
         let span = self.line.code_span(start, operands);
+        if self.flow.labels.len() >= MOST_LABELS as usize {
+            return Err(self.flow_error(ErrorKind::OTooMany { limit: MOST_LABELS }, span));
+        }
         let label = self.flow.intern(&text);
         self.flow.text = text;
         let scope = match keyword {

@@ -18,6 +18,8 @@ mod queue;
 mod recovery;
 mod saved;
 mod splines;
+#[cfg(feature = "std")]
+mod start_line;
 mod state;
 mod threads;
 mod tools;
@@ -29,9 +31,17 @@ use crate::parameters::{self, Parameters};
 use crate::settings::{Dialect, MM_PER_INCH, Settings};
 use crate::source::{LineSource, Place};
 use crate::tool_table::ToolTable;
-use pkm_canon::{Canon, CanonSink, LengthUnit, Position, Span};
+use pkm_canon::{Canon, CanonSink, FileId, LengthUnit, Position, Span};
 use queue::Queue;
 use state::State;
+
+/// True for the names that the interpreter itself gives a value.
+#[cfg(feature = "std")]
+pub(crate) fn is_predefined(name: &[u8]) -> bool {
+    static STATE: std::sync::OnceLock<alloc::boxed::Box<State>> = std::sync::OnceLock::new();
+    let state = STATE.get_or_init(|| alloc::boxed::Box::new(State::new(Settings::default())));
+    name == b"_current_tool" || state.predefined(name).is_some()
+}
 
 /// What a step left behind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,6 +111,10 @@ pub struct Interpreter {
     blocks: u64,
     /// The block has been read and is being executed.
     executing: bool,
+    /// The next move is the first after a start from a line.
+    approaches: bool,
+    /// Lines of the program before this one have been executed: what lies before it is executed again.
+    furthest: u32,
     #[cfg(feature = "alloc")]
     flow: flow::Flow,
     #[cfg(feature = "alloc")]
@@ -120,6 +134,8 @@ impl Interpreter {
             idle_blocks: 0,
             blocks: 0,
             executing: false,
+            approaches: false,
+            furthest: 0,
             #[cfg(feature = "alloc")]
             flow: flow::Flow::default(),
             #[cfg(feature = "alloc")]
@@ -321,8 +337,13 @@ impl Interpreter {
         Error { kind, span: self.line.span(end, end) }
     }
 
-    /// A loop that does nothing for too long is taken for endless; a run may have a limit.
-    fn count_block(&mut self) -> Result<(), Error> {
+    /// A loop that does nothing for too long is taken for endless; a run may have a limit. Lines of the program that are
+    /// executed for the first time do not count: however long it is, it ends.
+    fn count_block(&mut self, here: Place) -> Result<(), Error> {
+        if here.file == FileId(0) && here.line >= self.furthest {
+            self.furthest = here.line + 1;
+            return Ok(());
+        }
         self.idle_blocks += 1;
         self.blocks += 1;
         let Settings { max_idle_blocks, max_blocks, .. } = self.state.settings;
@@ -334,7 +355,11 @@ impl Interpreter {
             return Ok(());
         };
         self.phase = Phase::Ended;
-        Err(Error { kind, span: self.line.whole() })
+        #[cfg(feature = "alloc")]
+        let span = self.flow.last_loop().unwrap_or_else(|| self.line.whole());
+        #[cfg(not(feature = "alloc"))]
+        let span = self.line.whole();
+        Err(Error { kind, span })
     }
 
     fn execute_line(
@@ -364,7 +389,7 @@ impl Interpreter {
             _ => {}
         }
         self.line.prepare()?;
-        self.count_block()?;
+        self.count_block(here)?;
         let start = self.line.skip_number()?;
         self.state.source_line = self.line.number;
         if self.line.code().get(start) == Some(&b'o') {
@@ -382,6 +407,10 @@ impl Interpreter {
         }
         self.block.read(&self.line, start, &self.state, &self.state.reader())?;
         self.state.complete(&mut self.block)?;
+        #[cfg(feature = "std")]
+        if let Some(motion) = self.block.motion.filter(|_| self.approaches) {
+            self.check_approach(motion)?;
+        }
         if self.block.motion.is_some() || self.block.has_pause() {
             self.idle_blocks = 0;
         }

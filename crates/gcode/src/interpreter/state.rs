@@ -169,6 +169,7 @@ impl State {
             diameter: self.modal.diameter,
             spindles: self.settings.spindles.min(8),
             machine_codes: self.settings.machine_codes,
+            largest: self.settings.largest_number(),
         }
     }
 
@@ -214,7 +215,7 @@ impl State {
     }
 
     /// Value of a predefined named parameter.
-    fn predefined(&self, name: &[u8]) -> Option<f64> {
+    pub(crate) fn predefined(&self, name: &[u8]) -> Option<f64> {
         let modal = &self.modal;
         let flag = |condition: bool| Some(if condition { 1.0 } else { 0.0 });
         let spindle = modal.spindles[0];

@@ -12,7 +12,8 @@ use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::text::{Spelling, TextWriter};
 use pkm_canon::{CanonSink, FileId, Motion9Writer};
 use pkm_gcode::{
-    FileSource, Interpreter, LineSource, MemorySource, Place, Settings, SourceError, ToolTable, canon_text_of,
+    Error, FileSource, Interpreter, LineSource, MemorySource, Place, Settings, SourceError, ToolTable,
+    canon_text_of,
 };
 use pkm_run::Program;
 use serde_json::json;
@@ -95,6 +96,8 @@ fn settings(arguments: &Canon) -> Settings {
             rs274.machine_units_per_mm
         },
         block_delete: arguments.block_delete,
+        max_blocks: arguments.bounds.max_blocks,
+        max_idle_blocks: arguments.bounds.max_blocks,
         ..rs274
     }
 }
@@ -129,7 +132,7 @@ fn print<W: Write>(
         CanonFormat::Json => Box::new(JsonWriter::new(line, &name)),
     };
     let mut source = Stoppable { source, stop: &stop };
-    canon_text_of(interpreter, &mut source, &mut *sink, |error, interpreter, source| {
+    let mut told = |error: &Error, interpreter: &Interpreter, source: &dyn LineSource| {
         let text = interpreter.source_line();
         let diagnostic = interpreter.diagnose(error, source, &name);
         if arguments.format == CanonFormat::Json {
@@ -137,7 +140,15 @@ fn print<W: Write>(
             line(format!("{object}\n").as_bytes());
         }
         !stop.get() && report(&diagnostic, text)
-    });
+    };
+    let begun = match arguments.bounds.start_line {
+        Some(line) => interpreter.skip_to_line(line, &mut source, &mut *sink),
+        None => Ok(()),
+    };
+    match begun {
+        Err(error) => drop(told(&error, interpreter, &source)),
+        Ok(()) => canon_text_of(interpreter, &mut source, &mut *sink, told),
+    }
     drop(sink);
     match error.take() {
         Some(error) => Err(error),

@@ -1,7 +1,7 @@
 //! `pkm check`: everything that can be said before cutting.
 
 use crate::cli::{Check, Format};
-use crate::commands::program::{Job, Refused};
+use crate::commands::program::{Job, Refused, Text};
 use crate::outcome::{Failure, Outcome};
 use crate::render::diagnostics::{Json, Messages};
 use pkm_canon::diagnostic::Severity;
@@ -13,7 +13,7 @@ use std::io::{Write, stdout};
 struct Answer<'a> {
     schema: u32,
     program: String,
-    machine: &'a str,
+    machine: Option<&'a str>,
     ok: bool,
     blocks: u64,
     moves: u64,
@@ -34,15 +34,22 @@ pub(crate) fn run(arguments: &Check, messages: &Messages) -> Result<Outcome, Fai
 }
 
 fn check(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
-    let job = Job::new(&arguments.program, messages)?;
-    let checked = pkm_run::check(&job.program, &job.machine, &job.options)?;
+    let (program, machine, checked) = if arguments.program.machine.machine.is_some() {
+        let job = Job::new(&arguments.program, messages)?;
+        let checked = pkm_run::check(&job.program, &job.machine, &job.options)?;
+        (job.program, Some(job.machine.name), checked)
+    } else {
+        let text = Text::new(&arguments.program, messages)?;
+        let checked = pkm_run::check_language(&text.program, &text.options)?;
+        (text.program, None, checked)
+    };
     let mut out = stdout().lock();
     match arguments.program.format {
         Format::Json => {
             let answer = Answer {
                 schema: pkm_run::SCHEMA,
-                program: job.program.name(),
-                machine: &job.machine.name,
+                program: program.name(),
+                machine: machine.as_deref(),
                 ok: !checked.has_errors(),
                 blocks: checked.blocks,
                 moves: checked.moves,
@@ -55,11 +62,11 @@ fn check(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
             let count = |severity| checked.diagnostics.iter().filter(|d| d.severity == severity).count();
             writeln!(
                 out,
-                "{}: {} blocks, {} moves on {}: {}, {}",
-                job.program.name(),
+                "{}: {} blocks, {} moves{}: {}, {}",
+                program.name(),
                 checked.blocks,
                 checked.moves,
-                job.machine.name,
+                machine.map_or_else(String::new, |machine| format!(" on {machine}")),
                 plural(count(Severity::Error), "error"),
                 plural(count(Severity::Warning), "warning"),
             )?;

@@ -31,7 +31,7 @@ pub(crate) struct Job {
 pub(crate) struct Refused<'a> {
     schema: u32,
     program: String,
-    machine: &'a str,
+    machine: Option<&'a str>,
     completed: bool,
     diagnostics: Vec<diagnostics::Json<'a>>,
 }
@@ -41,7 +41,7 @@ impl<'a> Refused<'a> {
         Self {
             schema: pkm_run::SCHEMA,
             program: arguments.program.display().to_string(),
-            machine: &arguments.machine.machine,
+            machine: arguments.machine.machine.as_deref(),
             completed: false,
             diagnostics: diagnostics.iter().map(diagnostics::Json::from).collect(),
         }
@@ -51,8 +51,25 @@ impl<'a> Refused<'a> {
 impl Job {
     /// Reads the machine, and a program that comes through a pipe.
     pub(crate) fn new(arguments: &ProgramArgs, messages: &Messages) -> Result<Self, Failure> {
-        let machine = Machine::load(&arguments.machine.machine, &arguments.machine.set)?;
+        let name = arguments.machine.machine.as_deref().unwrap_or_default();
+        let machine = Machine::load(name, &arguments.machine.set)?;
         let start = arguments.start.as_deref().map(|text| start(&machine, text)).transpose()?;
+        let Text { program, options, kept } = Text::new(arguments, messages)?;
+        Ok(Self { program, machine, options: Options { start, ..options }, kept })
+    }
+}
+
+/// A program and what may be set without a machine.
+pub(crate) struct Text {
+    pub program: Program,
+    pub options: Options,
+    /// The parameter file, to save it.
+    pub kept: Option<Kept>,
+}
+
+impl Text {
+    /// Reads tools and parameters, and a program that comes through a pipe.
+    pub(crate) fn new(arguments: &ProgramArgs, messages: &Messages) -> Result<Self, Failure> {
         let program = open(&arguments.program)?;
         let tools = match &arguments.tool_table {
             // Read once; the job lasts as long as the process.
@@ -66,9 +83,15 @@ impl Job {
             }
             None => (None, None),
         };
-        let block_delete = arguments.block_delete;
-        let options = Options { start, block_delete, tools, parameters, ..Options::default() };
-        Ok(Self { program, machine, options, kept })
+        let options = Options {
+            block_delete: arguments.block_delete,
+            start_line: arguments.bounds.start_line,
+            max_blocks: arguments.bounds.max_blocks,
+            tools,
+            parameters,
+            ..Options::default()
+        };
+        Ok(Self { program, options, kept })
     }
 }
 

@@ -78,12 +78,13 @@ impl Interpreter {
             }
             Keyword::While => {
                 let go_on = self.test(word)? != 0.0;
-                if let Some(Construct { kind: Kind::Do, line, .. }) = self.construct(word.name) {
+                if let Some(Construct { kind: Kind::Do, line, span, .. }) = self.construct(word.name) {
                     self.flow.skip = None;
                     if pkm {
                         self.flow.continuing = false;
                     }
                     if go_on && !self.flow.breaking {
+                        self.flow.last_loop = Some(span);
                         return self.seek(source, line);
                     }
                     self.flow.breaking = false;
@@ -115,7 +116,8 @@ impl Interpreter {
             Keyword::Endwhile | Keyword::Endrepeat => {
                 self.nothing_more(word.operands)?;
                 let kind = if keyword == Keyword::Endwhile { Kind::While } else { Kind::Repeat };
-                let begin = self.known(word, &[kind])?.line;
+                let Construct { line: begin, span, .. } = self.known(word, &[kind])?;
+                self.flow.last_loop = Some(span);
                 self.flow.skip = None;
                 if pkm {
                     self.flow.breaking = false;

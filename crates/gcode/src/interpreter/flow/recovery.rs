@@ -1,7 +1,7 @@
 //! Going on after an error in an o-word.
 
-use super::Style;
 use super::branches::{Construct, Kind};
+use super::{Style, Sub};
 use crate::error::{Error, ErrorKind};
 use crate::interpreter::Interpreter;
 use crate::lexer::Keyword;
@@ -48,6 +48,8 @@ impl Interpreter {
                 return;
             }
             Keyword::Sub => {
+                let sub = Sub { line: here, body: source.place(), style: Style::OWord };
+                self.flow.subs.entry(name.label).or_insert(sub);
                 self.flow.defining = Some(name.label);
                 self.flow.skip = Some(name);
                 return;
@@ -61,14 +63,10 @@ impl Interpreter {
             Keyword::Call => return self.state.set_return_value(Some(0.0)),
             _ => return self.flow.wrong.push(name.label),
         };
-        match known {
-            None => {
-                let construct = Construct { kind, line: here, span, left: None };
-                self.flow.constructs.insert(name, construct);
-            }
-            Some(known) if known == kind => {}
-            // The label is that of another construct: neither is known any more.
-            Some(_) => self.flow.wrong.push(name.label),
+        // Where the label was that of another construct, its end is now the end of this one.
+        if known != Some(kind) {
+            let construct = Construct { kind, line: here, span, left: None };
+            self.flow.constructs.insert(name, construct);
         }
         self.flow.branch_taken = true;
         // The test itself is right where only too much follows it.
