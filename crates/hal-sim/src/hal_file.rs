@@ -375,10 +375,10 @@ fn type_of(word: &Word<'_>) -> Result<PinType, FileError> {
     }
 }
 
-fn value_of(word: &Word<'_>, expected: PinType) -> Result<Value, FileError> {
-    let text = word.text;
+/// A value as people write it: `1`, `true`, `yes`, `on` for a bit; decimal, for u32 also hexadecimal; finite numbers.
+pub fn parse_value(text: &str, expected: PinType) -> Option<Value> {
     let hexadecimal = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
-    let value = match expected {
+    match expected {
         PinType::Bit => match text.to_ascii_lowercase().as_str() {
             "1" | "true" | "yes" | "on" => Some(Value::Bit(true)),
             "0" | "false" | "no" | "off" => Some(Value::Bit(false)),
@@ -390,8 +390,12 @@ fn value_of(word: &Word<'_>, expected: PinType) -> Result<Value, FileError> {
             Some(digits) => u32::from_str_radix(digits, 16).ok().map(Value::U32),
             None => text.parse().ok().map(Value::U32),
         },
-    };
-    value.ok_or_else(|| word.error(Problem::BadValue { text: text.to_owned(), expected }))
+    }
+}
+
+fn value_of(word: &Word<'_>, expected: PinType) -> Result<Value, FileError> {
+    let bad = || word.error(Problem::BadValue { text: word.text.to_owned(), expected });
+    parse_value(word.text, expected).ok_or_else(bad)
 }
 
 fn show_components(hal: &Hal, out: &mut String, pattern: &str) {

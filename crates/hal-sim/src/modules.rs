@@ -43,12 +43,13 @@ const BLOCKS: [(&str, Load); 22] = [
 ];
 
 /// Modules and their options, for `help` and for messages.
-pub const MODULES: [(&str, &str); 9] = [
+pub const MODULES: [(&str, &str); 10] = [
     ("threads", "name1= period1= (ns) [fp1=] ... name3= period3="),
     ("motmod", "servo_period_nsec= [base_period_nsec=] [num_joints=]"),
     ("stepgen", "step_type=0[,0...] [ctrl_type=p[,p...]]"),
     ("encoder", "[num_chan=]"),
     ("sampler", "cfg=TYPES (b, f, s, u for each pin) depth=ROWS"),
+    ("streamer", "cfg=TYPES (b, f, s, u for each pin) depth=ROWS"),
     ("driver", "model=NAME[,NAME...] (simulated: A4988 DRV8825 TMC2209 DM542 TB6600)"),
     ("motor", "[num_chan=] (simulated)"),
     ("trivkins", "[coordinates=]"),
@@ -158,7 +159,7 @@ pub fn load(hal: &mut Hal, module: &str, options: &[&str]) -> Result<(), LoadErr
             Ok(motor::Motors::load(hal, &vec![channel; channel_count(&choices)?])?)
         }
         "driver" => driver(hal, &choices),
-        "sampler" => sampler(hal, &choices),
+        "sampler" | "streamer" => fifo(hal, module, &choices),
         "trivkins" => match choices.iter().find(|choice| choice.key != "coordinates") {
             Some(choice) => choice.unknown(),
             None => Ok(()), // joints are axes already
@@ -206,7 +207,8 @@ fn channel_count(choices: &[Choice<'_>]) -> Result<usize, LoadError> {
     Ok(count)
 }
 
-fn sampler(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {
+/// Sampler or streamer.
+fn fifo(hal: &mut Hal, module: &str, choices: &[Choice<'_>]) -> Result<(), LoadError> {
     let (mut types, mut depth) = (None, None);
     for choice in choices {
         match choice.key {
@@ -228,7 +230,12 @@ fn sampler(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {
         }
     }
     let types = types.ok_or(LoadError::Missing("cfg"))?;
-    Ok(sampler::Sampler::load(hal, &types, depth.ok_or(LoadError::Missing("depth"))?)?)
+    let depth = depth.ok_or(LoadError::Missing("depth"))?;
+    match module {
+        "sampler" => sampler::Sampler::load(hal, &types, depth)?,
+        _ => streamer::Streamer::load(hal, &types, depth)?,
+    }
+    Ok(())
 }
 
 fn driver(hal: &mut Hal, choices: &[Choice<'_>]) -> Result<(), LoadError> {

@@ -52,6 +52,8 @@ pub(crate) enum Command {
     Kins(Kins),
     /// Play a compact step stream (steps.pkms): its steps as CSV, or its sums
     Steps(Steps),
+    /// Run a HAL file, or show what a HAL has
+    Hal(Hal),
     /// List the machines that ship, or print one annotated machine file
     Machines(Machines),
     /// Write a complete LinuxCNC configuration for a machine: INI, HAL, geometry, tool table, example program, README
@@ -72,6 +74,10 @@ impl Command {
             Self::Run(arguments) => &arguments.program.machine.set,
             Self::Check(arguments) => &arguments.program.machine.set,
             Self::Plan(arguments) => &arguments.program.machine.set,
+            Self::Hal(arguments) => match &arguments.command {
+                Some(HalCommand::Show(arguments)) => &arguments.set,
+                None => &arguments.set,
+            },
             Self::Linuxcnc(arguments) => &arguments.machine.set,
             Self::Canon(_)
             | Self::Steps(_)
@@ -328,6 +334,53 @@ pub(crate) enum StepsFormat {
     Json,
     /// Every step: time_ns, joint (from 0), step (1 or -1), count since the start
     Csv,
+}
+
+/// A HAL file as LinuxCNC's halcmd reads it: loadrt, addf, net, setp, sets, linkpp, show, ...
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub(crate) struct Hal {
+    #[command(subcommand)]
+    pub command: Option<HalCommand>,
+    /// HAL file; `-` is standard input
+    pub file: Option<PathBuf>,
+    /// Run so many periods of the slowest thread
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub ticks: u64,
+    /// Print this pin, parameter or signal after each period; repeatable
+    #[arg(long, value_name = "NAME")]
+    pub pin: Vec<String>,
+    /// Rows for the streamer, one a line
+    #[arg(long, value_name = "FILE")]
+    pub stream: Option<PathBuf>,
+    /// A fault on an input pin, as for `pkm run`; repeatable
+    #[arg(long, value_name = "FAULT")]
+    pub fault: Vec<pkm_hal_sim::PinFault>,
+    /// Begin with the wired HAL of this machine (see `pkm machines`)
+    #[arg(long, value_name = "FILE")]
+    pub machine: Option<String>,
+    /// Override a key of the machine file; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE", requires = "machine")]
+    pub set: Vec<String>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum HalCommand {
+    /// What a HAL has, as halcmd shows it; without file and machine: what can be loaded
+    Show(HalShow),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct HalShow {
+    /// [FILE] [comp|pin|param|sig|funct|thread|all] [beginning of the name]
+    #[arg(num_args = 0..=3)]
+    pub words: Vec<String>,
+    /// The wired HAL of this machine
+    #[arg(long, value_name = "FILE")]
+    pub machine: Option<String>,
+    /// Override a key of the machine file; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE", requires = "machine")]
+    pub set: Vec<String>,
 }
 
 #[derive(Debug, Args)]

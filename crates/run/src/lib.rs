@@ -28,6 +28,7 @@ pub use summary::{ClosestApproach, JointSummary, SCHEMA, Summary};
 use controller::Controller;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_gcode::{Parameters, ToolTable};
+use pkm_hal_sim::components::kinematics::Forward;
 use pkm_hal_sim::{Observer, PinFault, Simulation};
 use pkm_kins::Pose;
 use pkm_machine::Machine;
@@ -100,6 +101,21 @@ const PROGRESS_TICKS: u64 = 1000;
 
 /// The planner's queues are larger than the stack of a small thread.
 const STACK_BYTES: usize = 64 << 20;
+
+/// The HAL of a machine, wired as for a run with homing, and its mechanism behind the motors: `kinematics.axis.x` ...
+///
+/// # Errors
+/// The machine cannot be wired.
+pub fn machine_hal(machine: &Machine) -> Result<pkm_hal_sim::Hal, pkm_hal_sim::ConfigError> {
+    let wiring = wiring::Wiring { substeps: 1, switches: true, homed: true, seed: 1 };
+    let mut hal = Simulation::new(&wiring::config(machine, machine.home, wiring))?.hal().clone();
+    Forward::load(&mut hal, machine.mechanism, machine.home)?;
+    for n in 0..machine.joints.len() {
+        hal.net(&format!("j{n}-motor-pos"), &[&format!("kinematics.joint.{n}")])?;
+    }
+    hal.addf("kinematics.forward", "servo-thread")?;
+    Ok(hal)
+}
 
 /// Does work that needs more stack than small threads have: the planner's queues are large.
 ///

@@ -1,14 +1,15 @@
 //! Stepper drivers: the shortest step and direction times they accept.
 //!
-//! Figures are the minima of the makers' data sheets (rounded up to whole ns), measured at the driver's input:
+//! Figures are the minima of the makers' data sheets (rounded up to whole ns), measured at the driver's input. "Seconded"
+//! says who else states the figure; what nobody else does is marked.
 //!
 //! | model   | source                                                                                  |
 //! |---------|-----------------------------------------------------------------------------------------|
-//! | A4988   | Allegro A4988 data sheet, "timing requirements": STEP high and low 1 µs, DIR setup and hold 200 ns |
-//! | DRV8825 | TI SLVSA73, "timing requirements": STEP high and low 1.9 µs, DIR setup and hold 650 ns    |
-//! | TMC2209 | Trinamic TMC2209, "STEP/DIR interface": max(filter, t_CLK + 20 ns) = 104 ns at 12 MHz, DIR 20 ns |
-//! | DM542   | Leadshine DM542 manual: pulse high and low 2.5 µs, DIR setup 5 µs; no hold is stated, 5 µs taken |
-//! | TB6600  | boxes named TB6600 differ by maker; the slowest usual figures: 5 µs, 5 µs, 20 µs, 20 µs   |
+//! | A4988   | Allegro A4988 data sheet, "timing requirements": STEP high and low 1 µs, DIR setup and hold 200 ns. Seconded: Marlin `Configuration_adv.h` (1 µs, 200 ns), applied-ee.github.io "Step/Direction Interface" |
+//! | DRV8825 | TI SLVSA73, "timing requirements": STEP high and low 1.9 µs, DIR setup and hold 650 ns. Seconded: both of these (2 µs rounded, 650 ns) |
+//! | TMC2209 | Trinamic TMC2209, "STEP/DIR interface": max(filter, t_CLK + 20 ns) = 104 ns at 12 MHz, DIR 20 ns. Seconded: both of these (100 ns rounded, 20 ns) |
+//! | DM542   | Leadshine DM542 manual: pulse high and low 2.5 µs, DIR setup 5 µs; no hold is stated, 5 µs taken. Not seconded |
+//! | TB6600  | boxes named TB6600 differ by maker; slow figures on purpose: 5 µs, 5 µs, 20 µs, 20 µs. Marlin guesses 3 µs and 1.5 µs; others report 5 µs for DIR from a data sheet |
 
 use crate::timing::PulseTimingNs;
 

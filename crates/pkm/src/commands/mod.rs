@@ -4,6 +4,7 @@ pub(crate) mod canon;
 pub(crate) mod check;
 pub(crate) mod faults;
 pub(crate) mod generate;
+pub(crate) mod hal;
 pub(crate) mod import_linuxcnc;
 pub(crate) mod kins;
 pub(crate) mod linuxcnc;
