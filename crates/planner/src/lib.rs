@@ -24,6 +24,7 @@ mod operator;
 pub mod path;
 mod planner;
 mod switch;
+mod walk;
 
 pub use frame::{Event, Frame};
 pub use jerk::Smoother;

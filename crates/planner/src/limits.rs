@@ -133,8 +133,27 @@ impl<const R: usize> Limits<R> {
         self.joints.len() + self.axes.len()
     }
 
+    /// Joints and limited axes, row by row.
+    pub(crate) fn row_values(&self, pose: &Pose, joints: &Joints) -> [f64; R] {
+        let mut values = [0.0; R];
+        let axes = self.axes.iter().map(|limits| pose.get(limits.axis));
+        let all = joints.iter().copied().take(self.joints.len()).chain(axes);
+        for (slot, value) in values.iter_mut().zip(all) {
+            *slot = value;
+        }
+        values
+    }
+
+    /// A row outside its travel.
+    pub(crate) fn out_of_travel(&self, row: usize, value: f64, range: JointRange) -> PlanErrorKind {
+        match self.axes.get(row.wrapping_sub(self.joints.len())) {
+            Some(limits) => PlanErrorKind::AxisTravel { axis: limits.axis, value, range },
+            None => PlanErrorKind::JointTravel { joint: row, value, range },
+        }
+    }
+
     /// The travel of a row.
-    fn range(&self, row: usize) -> Option<JointRange> {
+    pub(crate) fn range(&self, row: usize) -> Option<JointRange> {
         match self.joints.get(row) {
             Some(limits) => Some(limits.range),
             None => self.axes.get(row - self.joints.len()).and_then(|limits| limits.range),
@@ -142,18 +161,13 @@ impl<const R: usize> Limits<R> {
     }
 
     /// Checks a pose and its joints against travel.
-    pub(crate) fn check_travel(&self, pose: &Pose, joints: &Joints) -> Result<(), PlanErrorKind> {
-        for (joint, (limits, &value)) in self.joints.iter().zip(joints).enumerate() {
-            if !limits.range.contains(value) {
-                return Err(PlanErrorKind::JointTravel { joint, value, range: limits.range });
-            }
-        }
-        for limits in &self.axes {
-            let value = pose.get(limits.axis);
-            if let Some(range) = limits.range
-                && !range.contains(value)
-            {
-                return Err(PlanErrorKind::AxisTravel { axis: limits.axis, value, range });
+    ///
+    /// # Errors
+    /// The first joint, or else axis, outside its travel.
+    pub fn check_travel(&self, pose: &Pose, joints: &Joints) -> Result<(), PlanErrorKind> {
+        for (row, value) in self.row_values(pose, joints).into_iter().enumerate().take(self.rows()) {
+            if let Some(range) = self.range(row).filter(|range| !range.contains(value)) {
+                return Err(self.out_of_travel(row, value, range));
             }
         }
         Ok(())
@@ -249,10 +263,7 @@ impl<const R: usize> Limits<R> {
                 let to_turn = length * speed_a.abs() / (speed_a.abs() + speed_b.abs());
                 let value = a.position[row] + 0.5 * speed_a / self.per_velocity[row] * to_turn;
                 if !range.contains(value) {
-                    let kind = match self.axes.get(row.wrapping_sub(self.joints.len())) {
-                        Some(limits) => PlanErrorKind::AxisTravel { axis: limits.axis, value, range },
-                        None => PlanErrorKind::JointTravel { joint: row, value, range },
-                    };
+                    let kind = self.out_of_travel(row, value, range);
                     let pose = Pose::from_array(piece.geometry.at(s + to_turn).position);
                     return Err(PlanError { kind, span: piece.span, pose });
                 }

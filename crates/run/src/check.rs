@@ -3,7 +3,7 @@
 //! Nothing is planned here: every programmed move is sampled closely along its whole length. All findings are
 //! reported (one a block and kind), not only the first.
 
-use crate::feeder::{Events, face, frame, inside, interpreter, settings, skip_to_line};
+use crate::feeder::{Events, HostLimits, face, frame, inside, interpreter, limits, settings, skip_to_line};
 use crate::program::Program;
 use crate::switch::switched;
 use crate::{Options, messages};
@@ -11,11 +11,12 @@ use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_gcode::{Settings, Status};
 use pkm_kins::machine::Mechanism;
-use pkm_kins::{JointRange, Joints, Kinematics, Pose};
+use pkm_kins::{JointRange, Kinematics, Pose};
 use pkm_machine::Machine;
 use pkm_planner::path::Geometry;
 use pkm_planner::{Event, Frame, Move, PlanError, PlanErrorKind};
 use std::collections::{BTreeSet, VecDeque};
+use std::ops::ControlFlow;
 
 /// Distance between samples, mm (or rad where only angles move), and the most samples a move gets.
 const SPACING: f64 = 0.25;
@@ -114,7 +115,8 @@ fn interpret(program: &Program, machine: &Machine, options: &Options) -> Result<
     let mut checked = Checked::default();
     let mut mechanism = machine.mechanism;
     let at_start = mechanism.inverse(&start).map_err(PlanErrorKind::Unreachable);
-    if let Err(kind) = at_start.and_then(|joints| travel(machine, &start, &joints)) {
+    let limits = limits(program, machine)?;
+    if let Err(kind) = at_start.and_then(|joints| limits.check_travel(&start, &joints)) {
         let error = PlanError { kind, span: Span::default(), pose: start };
         let mut finding = messages::plan(program, machine, &error);
         finding.message = format!("where the machine stands at the start: {}", finding.message);
@@ -163,7 +165,7 @@ fn interpret(program: &Program, machine: &Machine, options: &Options) -> Result<
                     if core::mem::take(&mut approaches) {
                         findings.push(messages::approach(program, machine, span, &start));
                     }
-                    check_move(program, machine, &mechanism, &step, span, &mut findings);
+                    check_move(program, machine, &mechanism, &limits, (&step, span), &mut findings);
                 }
                 Event::Unsupported(what) => findings.push(messages::unsupported(program, span, what)),
                 Event::MachineCode(number) => {
@@ -220,25 +222,6 @@ fn check_switch(
     Ok(())
 }
 
-/// Travel of joints and axes.
-fn travel(machine: &Machine, pose: &Pose, joints: &Joints) -> Result<(), PlanErrorKind> {
-    for (joint, (limits, &value)) in machine.joints.iter().zip(joints).enumerate() {
-        let range = limits.range;
-        if !range.contains(value) {
-            return Err(PlanErrorKind::JointTravel { joint, value, range });
-        }
-    }
-    for limits in &machine.axes {
-        let value = pose.get(limits.axis);
-        if let Some(range) = limits.range
-            && !range.contains(value)
-        {
-            return Err(PlanErrorKind::AxisTravel { axis: limits.axis, value, range });
-        }
-    }
-    Ok(())
-}
-
 /// By how much more than `known` an error of the same kind misses; negative for another kind.
 fn excess(kind: &PlanErrorKind, known: &PlanErrorKind) -> f64 {
     let beyond = |value: f64, range: JointRange| (range.min - value).max(value - range.max);
@@ -260,8 +243,8 @@ fn check_move(
     program: &Program,
     machine: &Machine,
     mechanism: &Mechanism,
-    step: &Move,
-    span: Span,
+    limits: &HostLimits,
+    (step, span): (&Move, Span),
     findings: &mut Vec<Diagnostic>,
 ) {
     if !step.rapid && !(step.feed.speed > 0.0) {
@@ -272,29 +255,22 @@ fn check_move(
     let count = (length * bend / SPACING).clamp(2.0, f64::from(MOST_SAMPLES)) as u32;
     let mut nearest: Option<(f64, usize, Pose)> = None;
     let mut worst: Option<(PlanErrorKind, Pose)> = None;
-    for k in 0..=count {
-        let s = if k == count { length } else { length * f64::from(k) / f64::from(count) };
-        let point = step.geometry.at(s);
-        let [pose, first, second] = [point.position, point.first, point.second].map(Pose::from_array);
-        // Not the place alone: an axis may be locked, a form switch too near to be passed.
-        let motion = mechanism.motion(&pose, &first, &second).map_err(PlanErrorKind::Unreachable);
-        if let Err(kind) = motion.and_then(|motion| travel(machine, &pose, &motion.position)) {
-            if worst.as_ref().is_none_or(|(known, _)| excess(&kind, known) > 0.0) {
-                worst = Some((kind, pose));
+    limits.walk(mechanism, &step.geometry, count, |pose, outcome| {
+        match outcome {
+            Err(kind) => {
+                if worst.as_ref().is_none_or(|(known, _)| excess(&kind, known) > 0.0) {
+                    worst = Some((kind, *pose));
+                }
             }
-            continue;
+            Ok(measure) => {
+                let value = measure.inverse.min(measure.forward);
+                if value < machine.singularity.warn && nearest.is_none_or(|(best, ..)| value < best) {
+                    nearest = Some((value, measure.inverse_joint, *pose));
+                }
+            }
         }
-        let Ok(measure) = mechanism.singularity(&pose) else { continue };
-        let value = measure.inverse.min(measure.forward);
-        if !(value >= machine.singularity.guard) {
-            worst.get_or_insert((
-                PlanErrorKind::Unreachable(pkm_kins::InverseError::Singular { measure: value }),
-                pose,
-            ));
-        } else if value < machine.singularity.warn && nearest.is_none_or(|(best, ..)| value < best) {
-            nearest = Some((value, measure.inverse_joint, pose));
-        }
-    }
+        ControlFlow::Continue(())
+    });
     if let Some((kind, pose)) = worst {
         findings.push(messages::plan(program, machine, &PlanError { kind, span, pose }));
         return;

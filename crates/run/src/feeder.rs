@@ -20,8 +20,12 @@ use pkm_planner::{
 use std::collections::VecDeque;
 use std::fmt;
 
-/// Joints and limited axes of any machine here; pieces and nodes for a look-ahead of thousands of short blocks.
-type HostPlanner = Planner<Mechanism, 12, 2048, 2048>;
+/// Pieces and nodes for a look-ahead of thousands of short blocks.
+type HostPlanner = Planner<Mechanism, ROWS, 2048, 2048>;
+
+/// Joints and limited axes of any machine here.
+const ROWS: usize = 12;
+pub(crate) type HostLimits = Limits<ROWS>;
 
 /// Setpoints a smoother can average: its longest window with ten rows between the servo ticks.
 const SMOOTHER: usize = 640;
@@ -107,6 +111,31 @@ pub(crate) fn frame(machine: &Machine, start: &Pose) -> Frame {
     Frame::new(start.to_array(), tolerance)
 }
 
+/// What the joints and axes of a machine may do.
+pub(crate) fn limits(program: &Program, machine: &Machine) -> Result<HostLimits, Diagnostic> {
+    let joints: Vec<JointLimits> = machine
+        .joints
+        .iter()
+        .map(|joint| JointLimits {
+            range: joint.range,
+            max_velocity: joint.max_velocity,
+            max_acceleration: joint.max_acceleration,
+        })
+        .collect();
+    let axes: Vec<AxisLimits> = machine
+        .axes
+        .iter()
+        .map(|limits| AxisLimits {
+            axis: limits.axis,
+            range: limits.range,
+            max_velocity: limits.max_velocity.unwrap_or(f64::INFINITY),
+            max_acceleration: limits.max_acceleration.unwrap_or(f64::INFINITY),
+        })
+        .collect();
+    Limits::new(&joints, &axes, machine.singularity.guard)
+        .map_err(|e| messages::host(program, &format!("the machine's limits cannot be planned with: {e:?}")))
+}
+
 /// Collects the events of one block.
 pub(crate) struct Events<'a> {
     pub(crate) frame: &'a mut Frame,
@@ -175,28 +204,7 @@ impl<'a> Feeder<'a> {
         options: &Options,
     ) -> Result<Self, Diagnostic> {
         let start = options.program_start(machine);
-        let joints: Vec<JointLimits> = machine
-            .joints
-            .iter()
-            .map(|joint| JointLimits {
-                range: joint.range,
-                max_velocity: joint.max_velocity,
-                max_acceleration: joint.max_acceleration,
-            })
-            .collect();
-        let axes: Vec<AxisLimits> = machine
-            .axes
-            .iter()
-            .map(|limits| AxisLimits {
-                axis: limits.axis,
-                range: limits.range,
-                max_velocity: limits.max_velocity.unwrap_or(f64::INFINITY),
-                max_acceleration: limits.max_acceleration.unwrap_or(f64::INFINITY),
-            })
-            .collect();
-        let limits = Limits::new(&joints, &axes, machine.singularity.guard).map_err(|e| {
-            messages::host(program, &format!("the machine's limits cannot be planned with: {e:?}"))
-        })?;
+        let limits = limits(program, machine)?;
         let settings = pkm_planner::Settings {
             servo_period_s: machine.servo_period_ns as f64 / 1e9,
             substeps: options.substeps.max(1),

@@ -4,7 +4,7 @@ use crate::program::Program;
 use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_hal_sim::{Fault, HalError, HomingError, PinFault};
-use pkm_kins::{InverseError, Kinematics, Pose, maths};
+use pkm_kins::{InverseError, JointLimit, Kinematics, Pose, Side, maths};
 use pkm_machine::{Machine, Refusal, SwitchTarget};
 use pkm_planner::{PlanError, PlanErrorKind};
 use std::io;
@@ -59,8 +59,8 @@ pub(crate) fn plan(program: &Program, machine: &Machine, error: &PlanError) -> D
     match error.kind {
         PlanErrorKind::JointTravel { joint, value, range } => {
             let low = value < range.min;
-            let (prefix, name) = machine.mechanism.joint_code(joint);
-            let code = format!("{prefix}limit_{}:{name}", if low { "low" } else { "high" });
+            let (side, limit) = if low { (Side::Low, range.min) } else { (Side::High, range.max) };
+            let code = machine.refused_travel(&JointLimit { joint, side, value, limit }).code;
             let (joint_name, unit, face): (_, _, &dyn Fn(f64) -> f64) = match machine.joints.get(joint) {
                 Some(j) => (j.name.as_str(), unit(j.kind), &|v| j.to_face(v)),
                 None => ("?", "mm", &|v| v),

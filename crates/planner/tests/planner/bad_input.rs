@@ -4,8 +4,8 @@
 use crate::catalogue::{Case, blend, identity, moma, polyline, xyz};
 use crate::harness::{Disturbance, Rig, Sampling, TestPlanner, drive, limits, start, to_move, with_stack};
 use pkm_canon::Span;
-use pkm_kins::{Axis, JointRange};
-use pkm_planner::path::{Geometry, Line, Vector};
+use pkm_kins::{Axis, JointRange, Kinematics};
+use pkm_planner::path::{Arc, Geometry, Line, Vector};
 use pkm_planner::{
     AxisLimits, JointLimits, Limits, LimitsError, PathMode, PlanErrorKind, PushError, Settings, State,
 };
@@ -236,5 +236,75 @@ fn a_start_out_of_reach_or_travel_is_refused() {
     with_stack(move || {
         let refused = TestPlanner::new(case.mechanism, limits(&case), SETTINGS, far);
         assert!(matches!(refused.map(|_| ()).unwrap_err().kind, PlanErrorKind::Unreachable(_)));
+    });
+}
+
+/// The push itself says it, before anything of the move is driven, and names joint, value, limit, place and block.
+#[test]
+fn a_move_that_leaves_the_travel_between_its_ends_is_refused_by_the_push() {
+    with_stack(|| {
+        // A line to where a half circle begins that bulges downwards.
+        let points = [xyz(30.0, -265.0, 0.0), xyz(40.0, -265.0, 0.0), xyz(-40.0, -265.0, 0.0)];
+        let arc = Arc::new(points[1], points[2], [0.0, -265.0, 0.0], [0.0, 0.0, 1.0], -1).unwrap();
+        let mut case = on_moma(&points, blend(0.1), 50.0);
+        case.moves[1] = (Geometry::Arc(arc), blend(0.1));
+        let joint_1 =
+            |place: &Vector| case.mechanism.inverse(&pkm_kins::Pose::from_array(*place)).unwrap()[0];
+        let ends = points.iter().map(joint_1).fold(f64::MIN, f64::max);
+        let along = |k: u32| Geometry::Arc(arc).at(arc.length * f64::from(k) / 10_000.0).position;
+        let top = (0..=10_000).map(|k| joint_1(&along(k))).fold(f64::MIN, f64::max);
+        assert!(top > ends + 1.0, "{top} {ends}: no bulge");
+        // A micrometre too little.
+        let range = JointRange { min: -1000.0, max: top - 1e-3 };
+        let wide = JointRange { min: -1000.0, max: 1000.0 };
+        let limits = |range| {
+            let joint = JointLimits { range, max_velocity: 100.0, max_acceleration: 1000.0 };
+            Limits::new(&[joint, JointLimits { range: wide, ..joint }], &[], 0.0).unwrap()
+        };
+        let mut planner =
+            Box::new(TestPlanner::new(case.mechanism, limits(range), SETTINGS, start(&case)).unwrap());
+        let step = |line: u32| {
+            let mut step = to_move(&case, case.moves[line as usize - 1]);
+            step.span = Span { line, ..Span::default() };
+            step
+        };
+        planner.push(step(1)).unwrap();
+        let refused = planner.push(step(2));
+        let Err(PushError::Plan(error)) = refused else { panic!("{refused:?}") };
+        assert_eq!(error.span.line, 2);
+        let PlanErrorKind::JointTravel { joint: 0, value, range: named } = error.kind else {
+            panic!("{error:?}")
+        };
+        assert!(named == range && !range.contains(value), "{error:?}");
+        let there = joint_1(&error.pose.to_array());
+        assert!((there - value).abs() < 0.01, "{error:?}: at that place it is {there}");
+        assert!(planner.push(step(2)).is_err(), "nothing more is taken");
+        // The move before is driven to its end, at rest.
+        planner.finish();
+        while planner.tick().unwrap().state != State::Idle {}
+        assert_eq!(planner.setpoint().pose.to_array(), points[1]);
+    });
+}
+
+/// Zero length, straight back, tolerances of nothing and of a kilometre: to the end, within all limits.
+#[test]
+fn reversals_and_absurd_tolerances_run() {
+    with_stack(|| {
+        let there = [
+            xyz(0.0, -265.0, 0.0),
+            xyz(10.0, -265.0, 0.0),
+            xyz(0.0, -265.0, 0.0),
+            xyz(0.0, -265.0, 0.0),
+            xyz(10.0, -265.0, 0.0),
+            xyz(10.0, -275.0, 0.0),
+        ];
+        let stop = clean("exact stop", &on_moma(&there, PathMode::ExactStop, f64::INFINITY));
+        for p in [1e-12, 1e-6, 0.01, 1e9] {
+            let blended = clean("reversal", &on_moma(&there, blend(p), f64::INFINITY));
+            println!("P {p}: {blended} s, exact stop {stop} s");
+            // There is no blend of a reversal: it stops there, and only there.
+            assert!(blended <= stop + 1e-3, "P {p}: {blended} s of {stop} s");
+            assert!(p > 1e-6 || stop - blended < 0.02, "P {p}: {blended} s of {stop} s");
+        }
     });
 }

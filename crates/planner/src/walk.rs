@@ -1,0 +1,95 @@
+//! A whole move looked at from end to end before anything moves: reach, working and assembly mode, travel and the
+//! singularity guard, at places along it and, for travel, between them too. `pkm check` and [`crate::Planner::push`]
+//! take the same walk; the nodes, set later and closer, are the second look.
+
+use crate::PlanErrorKind;
+use crate::limits::Limits;
+use crate::path::Geometry;
+use core::ops::ControlFlow;
+use pkm_kins::{InverseError, Kinematics, Pose, Singularity, maths};
+
+/// What a push looks at: a place every millimetre (or 0.02 rad), but no more than this.
+const SPACING_MM: f64 = 1.0;
+const SPACING_RAD: f64 = 0.02;
+const MOST_PLACES: u32 = 64;
+
+/// Places that a push looks at on a move.
+pub(crate) fn places(geometry: &Geometry) -> u32 {
+    let length = geometry.length();
+    let first = geometry.at(0.0).first;
+    let turning = crate::path::norm3(&first, 3) * length / SPACING_RAD;
+    let count = maths::ceil((length / SPACING_MM).max(turning));
+    if count < f64::from(MOST_PLACES) { (count as u32).max(1) } else { MOST_PLACES }
+}
+
+impl<const R: usize> Limits<R> {
+    /// Looks at `places` + 1 places evenly along `geometry`, and at where a joint or an axis turns back between them.
+    /// `each` gets the pose and the distance from singularities, or what is wrong there; it may end the walk.
+    ///
+    /// Between the places a joint is taken for a parabola through three of them: travel is judged with an error of the
+    /// third order in their distance.
+    pub fn walk<K: Kinematics>(
+        &self,
+        kinematics: &K,
+        geometry: &Geometry,
+        places: u32,
+        mut each: impl FnMut(&Pose, Result<Singularity, PlanErrorKind>) -> ControlFlow<()>,
+    ) {
+        let (length, places) = (geometry.length(), places.max(1));
+        // Rows at the two places before, where they are known.
+        let mut known = 0;
+        let mut last = [[0.0; R]; 2];
+        let mut middle = Pose::ZERO;
+        for k in 0..=places {
+            let s = if k == places { length } else { length * f64::from(k) / f64::from(places) };
+            let point = geometry.at(s);
+            let [pose, first, second] = [point.position, point.first, point.second].map(Pose::from_array);
+            // Not the place alone: an axis may be locked, a form switch too near to be passed.
+            let looked = kinematics.motion(&pose, &first, &second).map_err(PlanErrorKind::Unreachable);
+            let found = looked.and_then(|motion| {
+                self.check_travel(&pose, &motion.position)?;
+                let near = kinematics.singularity(&pose).map_err(PlanErrorKind::Unreachable)?;
+                let measure = near.inverse.min(near.forward);
+                if self.singularity_guard > 0.0 && !(measure >= self.singularity_guard) {
+                    return Err(PlanErrorKind::Unreachable(InverseError::Singular { measure }));
+                }
+                Ok((self.row_values(&pose, &motion.position), near))
+            });
+            let outcome = match found {
+                Ok((now, near)) => {
+                    if known >= 2
+                        && let Some(kind) = self.turns_outside(&last, &now)
+                        && each(&middle, Err(kind)).is_break()
+                    {
+                        return;
+                    }
+                    known = (known + 1).min(2);
+                    last = [last[1], now];
+                    Ok(near)
+                }
+                Err(kind) => {
+                    known = 0;
+                    Err(kind)
+                }
+            };
+            middle = pose;
+            if each(&pose, outcome).is_break() {
+                return;
+            }
+        }
+    }
+
+    /// A joint or axis that turns back outside its travel around the second of three evenly spaced places.
+    fn turns_outside(&self, [a, b]: &[[f64; R]; 2], c: &[f64; R]) -> Option<PlanErrorKind> {
+        for (row, ((a, b), c)) in a.iter().zip(b).zip(c).enumerate().take(self.rows()) {
+            if (b - a) * (c - b) < 0.0 {
+                // The top of the parabola through the three.
+                let value = b - (c - a) * (c - a) / (8.0 * (c - 2.0 * b + a));
+                if let Some(range) = self.range(row).filter(|range| !range.contains(value)) {
+                    return Some(self.out_of_travel(row, value, range));
+                }
+            }
+        }
+        None
+    }
+}
