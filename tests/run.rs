@@ -69,7 +69,7 @@ fn the_aerofoil_runs_on_moma_w_within_every_limit() {
     assert!(summary["closest_approach"]["line"].as_u64().unwrap() > 0);
     assert!(summary["closest_approach"]["joint"].as_str().unwrap().starts_with('p'));
 
-    assert_eq!(listing(&out), ["steps.vcd", "summary.json", "trace.csv"]);
+    assert_eq!(listing(&out), ["report.html", "steps.vcd", "summary.json", "trace.csv"]);
     let kept: Value =
         serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
     assert_eq!(kept, summary);
@@ -273,10 +273,13 @@ fn refused_programs_leave_old_files_alone() {
     let out = folder.path().to_str().unwrap();
     let run = pkm_with_input(&["run", "-", "--machine", "moma-a", "--out", out], b"G0 X300\nM2\n");
     assert_eq!(run.status, 1);
-    assert_eq!(listing(folder.path()), ["steps.vcd", "summary.json", "trace.csv"]);
-    for name in listing(folder.path()) {
+    assert_eq!(listing(folder.path()), ["report.html", "steps.vcd", "summary.json", "trace.csv"]);
+    for name in ["steps.vcd", "trace.csv", "summary.json"] {
         assert_eq!(std::fs::read_to_string(folder.path().join(name)).unwrap(), "old");
     }
+    // Only the report tells what was refused, and where.
+    let report = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(report.contains("refused, nothing moved") && report.contains("line 1: at X72.500"), "{report}");
 }
 
 /// Runs a shell command line; `$0` is pkm, `$1` the folder, `$2` a program.
@@ -358,7 +361,7 @@ fn an_interrupted_run_says_how_far_it_came() {
         finding["line"].as_u64().unwrap() > 0 && summary["servo_ticks"].as_u64().unwrap() > 0,
         "{summary}"
     );
-    assert_eq!(listing(&out), ["steps.vcd", "summary.json"]);
+    assert_eq!(listing(&out), ["report.html", "steps.vcd", "summary.json"]);
 }
 
 #[test]

@@ -117,6 +117,16 @@ impl Hexapod {
         self.radius
     }
 
+    /// Ends of the struts at a pose: on the base, on the platform (base frame, mm).
+    pub fn strut_points(&self, pose: &Pose) -> [[Vec3; 2]; 6] {
+        let at = Attitude::of(pose);
+        let mut ends = [[[0.0; 3]; 2]; 6];
+        for ((end, a), b) in ends.iter_mut().zip(&self.platform).zip(&self.base) {
+            *end = [*b, add([pose.x, pose.y, pose.z], at.rotate(*a))];
+        }
+        ends
+    }
+
     #[inline]
     fn struts(&self, pose: &Pose, at: &Attitude) -> Result<[Strut; 6], InverseError> {
         let mut struts = [Strut::default(); 6];

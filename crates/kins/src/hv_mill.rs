@@ -289,6 +289,38 @@ impl HvMill {
         &self.mechanism
     }
 
+    /// Centre of the rotary table in {B_j} with the carriage at p3, mm.
+    pub fn table_centre_mm(&self, carriage_mm: f64) -> Vec3 {
+        let (plane, third) = self.spindle.split(self.cr);
+        self.spindle.join(plane, third - carriage_mm)
+    }
+
+    /// {W} in {B_j} with the carriage at p3 (mm) and the table at p4 (rad): origin (mm) and unit vectors x y z.
+    pub fn workpiece_frame(&self, carriage_mm: f64, table_rad: f64) -> (Vec3, [Vec3; 3]) {
+        let table = sincos(self.table_sense * table_rad);
+        let turn = |v| self.spindle.table().rotate(table, v);
+        let origin = add(self.table_centre_mm(carriage_mm), turn(self.w0));
+        (origin, [turn([1.0, 0.0, 0.0]), turn([0.0, 1.0, 0.0]), turn([0.0, 0.0, 1.0])])
+    }
+
+    /// Origin of {W} relative to the table's centre, table at 0, in {B_j}, mm.
+    pub fn workpiece_mm(&self) -> Vec3 {
+        self.w0
+    }
+
+    /// The tool in {B_j} with the 4S's tip at q (head at 0) and the head at p5 (rad): platform point P, centre of the head
+    /// (the tip, if there is no head) and tip, mm.
+    pub fn tool_points(&self, q: Vec2, head_rad: f64) -> [Vec3; 3] {
+        let tool = self.spindle.from_q(self.mechanism.tool_mm());
+        let platform = sub(self.spindle.join(q, self.tip_third), tool);
+        let centre = add(platform, sub(tool, self.r_t));
+        let turned = match self.controlled_axes {
+            5 => Turn::Y.rotate(sincos(self.head_sense * head_rad), self.r_t),
+            _ => self.r_t,
+        };
+        [platform, centre, add(centre, turned)]
+    }
+
     /// The coordinates of a pose that drive this mechanism.
     fn state(&self, pose: &Pose) -> HvState {
         let w = [pose.x, pose.y, pose.z];

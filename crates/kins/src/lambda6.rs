@@ -347,6 +347,23 @@ impl Lambda6 {
         self.platform_radius
     }
 
+    /// The points of the three legs at a pose whose joints are `l`: upper slider S, rotary joint J, platform joint N, lower slider
+    /// (base frame, mm). J lies on S–N, so nothing is solved and no pose is refused.
+    pub fn leg_points(&self, pose: &Pose, l: &Joints) -> [[Vec3; 4]; 3] {
+        let at = Attitude::of(pose);
+        let [l1, l2, l3, l4, l5, l6, ..] = *l;
+        let [a, b, c] = &self.legs;
+        let points = |leg: &Leg, upper: f64, lower: f64| {
+            let [sx, sy] = leg.shaft;
+            let slider = [sx, sy, -upper];
+            let joint = add([pose.x, pose.y, pose.z], yawed(at.phi, at.tilted(leg.joint)));
+            let reach = [joint[0] - sx, joint[1] - sy, joint[2] + upper];
+            let elbow = add(slider, [leg.k * reach[0], leg.k * reach[1], leg.k * reach[2]]);
+            [slider, elbow, joint, [sx, sy, -lower]]
+        };
+        [points(a, l1, l4), points(b, l2, l5), points(c, l3, l6)]
+    }
+
     #[inline]
     fn solve(&self, pose: &Pose, at: &Attitude) -> Result<[LegState; 3], InverseError> {
         let mut solved = [LegState::default(); 3];

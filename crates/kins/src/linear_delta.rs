@@ -77,6 +77,11 @@ impl LinearDelta {
         })
     }
 
+    /// The columns, moved inwards by the platform's radius: where the rods hinge when all meet in the platform's centre, mm.
+    pub fn columns_mm(&self) -> [[f64; 2]; 3] {
+        self.columns
+    }
+
     #[inline(always)]
     fn rods(&self, pose: &Pose) -> Result<[Rod; 3], InverseError> {
         let [wa, wb, wc] = self.columns.map(|column| [pose.x - column[0], pose.y - column[1]]);

@@ -153,7 +153,7 @@ pub(crate) struct Bounds {
 pub(crate) struct Run {
     #[command(flatten)]
     pub program: ProgramArgs,
-    /// Write steps.vcd, trace.csv and summary.json into this folder
+    /// Write steps.vcd, trace.csv, summary.json and report.html into this folder
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Do not write trace.csv
@@ -162,6 +162,9 @@ pub(crate) struct Run {
     /// Also write steps.pkms, a compact stream for a microcontroller's timer, into the folder; its steps may be NS nanoseconds off
     #[arg(long, value_name = "NS", requires = "out", num_args = 0..=1, require_equals = true, default_missing_value = "0")]
     pub step_stream: Option<u64>,
+    /// Do not write report.html
+    #[arg(long)]
+    pub no_report: bool,
     /// Rows of trace.csv per servo period
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub trace_substeps: u32,

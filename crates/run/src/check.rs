@@ -7,8 +7,8 @@ use crate::feeder::{Events, HostLimits, face, frame, inside, interpreter, limits
 use crate::program::Program;
 use crate::switch::switched;
 use crate::{Options, messages};
-use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
+use pkm_canon::{FileId, Span};
 use pkm_gcode::{Settings, Status};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{JointRange, Kinematics, Pose};
@@ -98,19 +98,52 @@ impl Checked {
     }
 }
 
+/// A move as the program wrote it.
+#[derive(Debug, Clone, Copy)]
+pub struct Programmed<'a> {
+    /// Its shape.
+    pub geometry: &'a Geometry,
+    /// G0.
+    pub rapid: bool,
+    /// Its line; 0 in the file of a subroutine.
+    pub line: u32,
+    /// The mechanism in force.
+    pub mechanism: &'a Mechanism,
+    /// The worst pose of it that the machine cannot take, if there is one.
+    pub refused: Option<Pose>,
+}
+
 /// Checks a whole program.
 ///
 /// # Errors
 /// The program cannot be read.
 pub fn check(program: &Program, machine: &Machine, options: &Options) -> Result<Checked, Diagnostic> {
-    let mut checked = interpret(program, machine, options)?;
+    check_with(program, machine, options, |_| {})
+}
+
+/// [`check`], and shows every move to `seen` when it has been checked.
+///
+/// # Errors
+/// As [`check`].
+pub fn check_with(
+    program: &Program,
+    machine: &Machine,
+    options: &Options,
+    seen: impl FnMut(&Programmed<'_>),
+) -> Result<Checked, Diagnostic> {
+    let mut checked = interpret(program, machine, options, seen)?;
     checked.add_static(program, &settings(Some(machine), options), options)?;
     checked.sort(program);
     Ok(checked)
 }
 
 /// Interprets the program and looks at every move.
-fn interpret(program: &Program, machine: &Machine, options: &Options) -> Result<Checked, Diagnostic> {
+fn interpret(
+    program: &Program,
+    machine: &Machine,
+    options: &Options,
+    mut seen: impl FnMut(&Programmed<'_>),
+) -> Result<Checked, Diagnostic> {
     let start = options.program_start(machine);
     let mut checked = Checked::default();
     let mut mechanism = machine.mechanism;
@@ -165,7 +198,15 @@ fn interpret(program: &Program, machine: &Machine, options: &Options) -> Result<
                     if core::mem::take(&mut approaches) {
                         findings.push(messages::approach(program, machine, span, &start));
                     }
-                    check_move(program, machine, &mechanism, &limits, (&step, span), &mut findings);
+                    let refused =
+                        check_move(program, machine, &mechanism, &limits, (&step, span), &mut findings);
+                    seen(&Programmed {
+                        geometry: &step.geometry,
+                        rapid: step.rapid,
+                        line: if span.file == FileId(0) { span.line } else { 0 },
+                        mechanism: &mechanism,
+                        refused,
+                    });
                 }
                 Event::Unsupported(what) => findings.push(messages::unsupported(program, span, what)),
                 Event::MachineCode(number) => {
@@ -238,7 +279,7 @@ fn excess(kind: &PlanErrorKind, known: &PlanErrorKind) -> f64 {
     }
 }
 
-/// Samples one move from end to end; the worst place of the first kind of trouble is the block's finding.
+/// Samples one move from end to end; the worst place of the first kind of trouble is the block's finding, and the answer.
 fn check_move(
     program: &Program,
     machine: &Machine,
@@ -246,7 +287,7 @@ fn check_move(
     limits: &HostLimits,
     (step, span): (&Move, Span),
     findings: &mut Vec<Diagnostic>,
-) {
+) -> Option<Pose> {
     if !step.rapid && !(step.feed.speed > 0.0) {
         findings.push(messages::feed_unset(program, span));
     }
@@ -273,9 +314,10 @@ fn check_move(
     });
     if let Some((kind, pose)) = worst {
         findings.push(messages::plan(program, machine, &PlanError { kind, span, pose }));
-        return;
+        return Some(pose);
     }
     if let Some((value, joint, pose)) = nearest {
         findings.push(messages::too_near_singularity(program, machine, span, &pose, joint, value));
     }
+    None
 }

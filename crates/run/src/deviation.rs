@@ -28,9 +28,9 @@ impl Programmed {
         self.chords.clear();
     }
 
-    /// Distance (mm; the larger of XYZ and UVW) of a pose from the path, while the planner is on move `motion`,
-    /// at `s` of it, or on the blend after it.
-    pub(crate) fn distance_mm(&mut self, motion: u32, s: f64, blending: bool, pose: &Vector) -> Option<f64> {
+    /// Distance (mm; the larger of XYZ and UVW) of a pose from the path, and the place on the path that is nearest, while
+    /// the planner is on move `motion`, at `s` of it, or on the blend after it.
+    pub(crate) fn nearest(&mut self, motion: u32, s: f64, blending: bool, pose: &Vector) -> Option<Near> {
         while self.moves.get(1).is_some_and(|(number, _)| *number <= motion) {
             self.moves.pop_front();
         }
@@ -40,29 +40,43 @@ impl Programmed {
         }
         let mut best = self.off_move(here, geometry, if blending { geometry.length() } else { s }, pose);
         if blending && let Some((next, geometry)) = self.moves.get(1) {
-            best = best.min(self.off_move(*next, geometry, 0.0, pose));
+            best = best.nearer(self.off_move(*next, geometry, 0.0, pose));
         }
         Some(best)
     }
 
     /// Distance from a move as it was programmed: from its chords, if it has any.
-    fn off_move(&self, motion: u32, geometry: &Geometry, guess: f64, pose: &Vector) -> f64 {
-        let mut best = f64::INFINITY;
+    fn off_move(&self, motion: u32, geometry: &Geometry, guess: f64, pose: &Vector) -> Near {
+        let mut best = Near { distance_mm: f64::INFINITY, place: *pose };
         let mut start = geometry.at(0.0).position;
         let after = self.chords.iter().skip_while(|(number, _)| *number < motion);
         for (_, end) in after.take_while(|(number, _)| *number == motion) {
             if let Some(line) = Line::new(start, *end) {
                 // A line is found from anywhere.
-                best = best.min(distance_mm(&Geometry::Line(line), 0.0, pose));
+                best = best.nearer(near(&Geometry::Line(line), 0.0, pose));
             }
             start = *end;
         }
-        if best.is_finite() { best } else { distance_mm(geometry, guess, pose) }
+        if best.distance_mm.is_finite() { best } else { near(geometry, guess, pose) }
     }
 }
 
-/// Distance from the place on a piece nearest to `pose`, found from `s` by Newton's method.
-fn distance_mm(geometry: &Geometry, mut s: f64, pose: &Vector) -> f64 {
+/// The place on a path nearest to a pose.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Near {
+    /// The larger of the distances in XYZ and UVW.
+    pub(crate) distance_mm: f64,
+    pub(crate) place: Vector,
+}
+
+impl Near {
+    fn nearer(self, other: Self) -> Self {
+        if other.distance_mm < self.distance_mm { other } else { self }
+    }
+}
+
+/// The place on a piece nearest to `pose`, found from `s` by Newton's method.
+fn near(geometry: &Geometry, mut s: f64, pose: &Vector) -> Near {
     const LENGTHS: [usize; 6] = [0, 1, 2, 6, 7, 8];
     let length = geometry.length();
     for _ in 0..4 {
@@ -77,12 +91,12 @@ fn distance_mm(geometry: &Geometry, mut s: f64, pose: &Vector) -> f64 {
             s = (s - slope / curve).clamp(0.0, length);
         }
     }
-    let near = geometry.at(s).position;
+    let place = geometry.at(s).position;
     let norm = |from: usize| {
-        let d = |i: usize| near[from + i] - pose[from + i];
+        let d = |i: usize| place[from + i] - pose[from + i];
         sqrt(d(0) * d(0) + d(1) * d(1) + d(2) * d(2))
     };
-    norm(0).max(norm(6))
+    Near { distance_mm: norm(0).max(norm(6)), place }
 }
 
 #[cfg(test)]
@@ -96,7 +110,7 @@ mod tests {
         let arc = Arc::new(start, start, [0.0; 3], [0.0, 0.0, 1.0], 1).unwrap();
         let (c, s) = (0.6, 0.8);
         let pose = [10.3 * c, 10.3 * s, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let got = distance_mm(&Geometry::Arc(arc), 9.0, &pose);
+        let got = near(&Geometry::Arc(arc), 9.0, &pose).distance_mm;
         assert!((got - 0.3).abs() < 1e-9, "{got}");
     }
 }

@@ -8,7 +8,9 @@ mod check;
 mod controller;
 mod deviation;
 mod feeder;
+mod judged;
 mod language;
+mod limited;
 mod messages;
 mod plan;
 mod program;
@@ -17,8 +19,10 @@ mod summary;
 mod switch;
 mod wiring;
 
-pub use check::{Checked, check};
+pub use check::{Checked, Programmed, check, check_with};
+pub use judged::Judged;
 pub use language::check_language;
+pub use limited::{Limited, limited};
 pub use pkm_analysis::outcome::{Objection, Outcome};
 pub use plan::{BlockPlan, Plan, Shares, plan};
 pub use program::Program;
@@ -145,6 +149,23 @@ pub fn run<O: Observer + Send>(
     progress: impl FnMut(&Progress) -> ControlFlow<()> + Send,
 ) -> Result<(Summary, Option<O>), Diagnostic> {
     let checked = check(program, machine, options)?;
+    run_checked(program, machine, options, checked, outputs, progress, |_, _| {})
+}
+
+/// [`run`] for a program that was checked already. `judged` sees the outputs and every servo period as the judge of the
+/// run saw it.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_checked<O: Observer + Send>(
+    program: &Program,
+    machine: &Machine,
+    options: &Options,
+    checked: Checked,
+    outputs: impl FnOnce(&Simulation) -> O + Send,
+    progress: impl FnMut(&Progress) -> ControlFlow<()> + Send,
+    judged: impl FnMut(&mut O, &Judged) + Send,
+) -> Result<(Summary, Option<O>), Diagnostic> {
     if checked.has_errors() {
         return Ok((Summary::refused(program, machine, checked), None));
     }
@@ -152,7 +173,7 @@ pub fn run<O: Observer + Send>(
         let worker = std::thread::Builder::new()
             .name("run".to_owned())
             .stack_size(STACK_BYTES)
-            .spawn_scoped(scope, || drive(program, machine, options, checked, outputs, progress))
+            .spawn_scoped(scope, || drive(program, machine, options, checked, outputs, progress, judged))
             .map_err(|e| messages::host(program, &format!("cannot start a thread: {e}")))?;
         worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
@@ -165,6 +186,7 @@ fn drive<O: Observer>(
     checked: Checked,
     outputs: impl FnOnce(&Simulation) -> O,
     mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
+    mut judged: impl FnMut(&mut O, &Judged),
 ) -> Result<(Summary, Option<O>), Diagnostic> {
     let mut controller = Controller::new(program, machine, options, false)?;
     let mut outputs = outputs(&controller.simulation);
@@ -195,11 +217,12 @@ fn drive<O: Observer>(
             findings.push(stop);
             break;
         }
-        if homing {
-            account.homing(&controller.simulation);
+        let period = if homing {
+            account.homing(&controller.simulation, &controller.feeder)
         } else {
-            account.tick(&controller.simulation, &mut controller.feeder);
-        }
+            account.tick(&controller.simulation, &mut controller.feeder)
+        };
+        judged(&mut outputs, &period);
     }
     let Controller { simulation, feeder, .. } = &controller;
     let mut summary = account.finish(program, machine, simulation, feeder);

@@ -6,17 +6,14 @@
 
 use crate::check::check;
 use crate::feeder::Feeder;
+use crate::limited::limited;
 use crate::program::Program;
 use crate::{Options, messages};
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_hal_sim::SetpointSource;
-use pkm_kins::Joints;
 use pkm_machine::Machine;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// A limit that uses at least this share of itself is what limits the motion.
-const SATURATED: f64 = 0.97;
 
 /// Seconds under each limit: `feed`, `p1 velocity`, `p1 acceleration`, `dwell`, or `look-ahead` where nothing is at its
 /// limit (short moves from stop to stop, rounding to whole servo periods).
@@ -109,8 +106,9 @@ fn drive(program: &Program, machine: &Machine, options: &Options, plan: &mut Pla
             last = ticks;
         }
         if moves || setpoint.state == pkm_planner::State::Dwell {
-            let limit = limit(machine, &feeder, &before, &setpoint.joints, period_s);
-            *blocks.entry(setpoint.span.line).or_default().entry(limit).or_default() += period_s;
+            let (limit, _) = limited(machine, &setpoint, &before, period_s);
+            let words = limit.words(machine);
+            *blocks.entry(setpoint.span.line).or_default().entry(words).or_default() += period_s;
         }
         before = [before[1], setpoint.joints];
     }
@@ -125,36 +123,6 @@ fn drive(program: &Program, machine: &Machine, options: &Options, plan: &mut Pla
     }
     plan.verdict = verdict(&plan.limited_by_s);
     Ok(())
-}
-
-/// What limits the machine in this servo period.
-fn limit(
-    machine: &Machine,
-    feeder: &Feeder<'_>,
-    before: &[Joints; 2],
-    now: &Joints,
-    period_s: f64,
-) -> String {
-    let setpoint = feeder.setpoint();
-    if setpoint.state == pkm_planner::State::Dwell {
-        return "dwell".to_owned();
-    }
-    let mut most = (setpoint.feed_use, "feed".to_owned());
-    for (j, joint) in machine.joints.iter().enumerate() {
-        let velocity = (now[j] - before[1][j]).abs() / period_s / joint.max_velocity;
-        let change = (now[j] - 2.0 * before[1][j] + before[0][j]).abs();
-        let acceleration = change / (period_s * period_s) / joint.max_acceleration;
-        for (share, what) in [(velocity, "velocity"), (acceleration, "acceleration")] {
-            if share > most.0 {
-                most = (share, format!("{} {what}", joint.name));
-            }
-        }
-    }
-    match most {
-        (share, _) if share < SATURATED => "look-ahead".to_owned(),
-        (_, what) if setpoint.blending => format!("corner: {what}"),
-        (_, what) => what,
-    }
 }
 
 fn verdict(shares: &Shares) -> String {

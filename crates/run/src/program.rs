@@ -1,7 +1,8 @@
 //! Where a program comes from. It is read twice (check, then run), so a pipe is kept in memory; a file is streamed.
 
 use pkm_gcode::{FileSource, LineSource, MemorySource};
-use std::io;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
 use std::path::PathBuf;
 
 /// A G-code program.
@@ -25,6 +26,17 @@ impl Program {
             Program::File(path) => path.display().to_string(),
             Program::Memory { name, .. } => name.clone(),
         }
+    }
+
+    /// Its text, from the first byte.
+    ///
+    /// # Errors
+    /// The file cannot be opened.
+    pub fn read(&self) -> io::Result<Box<dyn BufRead + '_>> {
+        Ok(match self {
+            Program::File(path) => Box::new(BufReader::new(File::open(path)?)),
+            Program::Memory { text, .. } => Box::new(text.as_slice()),
+        })
     }
 
     /// Opens it at its first line. Subroutine files are looked for beside the program.

@@ -2,10 +2,11 @@
 
 use crate::check::Checked;
 use crate::feeder::Feeder;
+use crate::judged::Judged;
 use crate::program::Program;
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_gcode::Parameters;
-use pkm_hal_sim::Simulation;
+use pkm_hal_sim::{Setpoint, Simulation};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::maths::sqrt;
 use pkm_kins::{Joints, Kinematics, MAX_JOINTS, Pose};
@@ -178,15 +179,35 @@ impl<'a> Account<'a> {
     }
 
     /// A period of homing: it takes time, but is no path.
-    pub(crate) fn homing(&mut self, simulation: &Simulation) {
+    pub(crate) fn homing(&mut self, simulation: &Simulation, feeder: &Feeder<'_>) -> Judged {
         self.ticks += 1;
-        let joints = simulation.report().setpoint.joints;
+        let Setpoint { pose, joints, .. } = *simulation.report().setpoint;
         (self.last, self.min, self.max) = ([joints; 2], joints, joints);
+        let setpoint = pkm_planner::Setpoint { pose, joints, feed_use: 0.0, ..*feeder.setpoint() };
+        Judged {
+            tick: self.ticks,
+            setpoint,
+            mechanism: *feeder.mechanism(),
+            executed: None,
+            nearest: None,
+            deviation_mm: None,
+            singularity: None,
+        }
     }
 
-    pub(crate) fn tick(&mut self, simulation: &Simulation, feeder: &mut Feeder<'_>) {
+    pub(crate) fn tick(&mut self, simulation: &Simulation, feeder: &mut Feeder<'_>) -> Judged {
         self.ticks += 1;
         let setpoint = *feeder.setpoint();
+        let mechanism = *feeder.mechanism();
+        let mut judged = Judged {
+            tick: self.ticks,
+            setpoint,
+            mechanism,
+            executed: None,
+            nearest: None,
+            deviation_mm: None,
+            singularity: None,
+        };
         let [before, last] = self.last;
         let mut moved = false;
         for (j, &q) in setpoint.joints.iter().enumerate() {
@@ -204,30 +225,31 @@ impl<'a> Account<'a> {
             self.last_motion = self.ticks;
         }
         if feeder.is_switching() {
-            return;
+            return judged;
         }
-        let mechanism = *feeder.mechanism();
         if let Ok(measure) = mechanism.singularity(&setpoint.pose) {
             let value = measure.inverse.min(measure.forward);
+            judged.singularity = Some(value);
             if value < self.singularity {
                 self.singularity = value;
                 self.closest = (setpoint.span.line, measure.inverse_joint);
             }
         }
-        if let Ok(executed) = simulation.feedback_pose(&mechanism)
-            && let Some(distance) = feeder.programmed.distance_mm(
-                setpoint.motion,
-                setpoint.s,
-                setpoint.blending,
-                &executed.to_array(),
-            )
-        {
-            self.deviation_mm = self.deviation_mm.max(distance);
+        if let Ok(executed) = simulation.feedback_pose(&mechanism) {
+            judged.executed = Some(executed);
+            let (motion, s) = (setpoint.motion, setpoint.s);
+            if let Some(near) = feeder.programmed.nearest(motion, s, setpoint.blending, &executed.to_array())
+            {
+                self.deviation_mm = self.deviation_mm.max(near.distance_mm);
+                judged.nearest = Some(Pose::from_array(near.place));
+                judged.deviation_mm = Some(near.distance_mm);
+            }
         }
         if self.ticks % REACH_EVERY == 1 {
             let reach_mm = half_step_reach_mm(self.machine, &mechanism, &setpoint.pose, &setpoint.joints);
             self.reach_mm = self.reach_mm.max(reach_mm);
         }
+        judged
     }
 
     pub(crate) fn finish(

@@ -10,7 +10,8 @@ use crate::render::diagnostics::Messages;
 use crate::render::summary;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use pkm_hal_sim::{Observer, Simulation, StreamWriter, TickReport, TraceWriter, VcdWriter};
-use pkm_run::{Options, Progress, Summary};
+use pkm_report::Recorder;
+use pkm_run::{Judged, Options, Program, Programmed, Progress, Summary};
 use pkm_stepgen::Edge;
 use std::io::{IsTerminal, Write, stderr, stdout};
 use std::ops::ControlFlow;
@@ -87,6 +88,9 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
         None => None,
     };
     let summary_file = create("summary.json")?;
+    let report_file = if arguments.no_report { None } else { create("report.html")? };
+    let start = options.start.unwrap_or(machine.home);
+    let mut report = report_file.is_some().then(|| Recorder::new(&machine, start));
 
     let interrupted = interrupt::flag();
     let write_failed = folder.as_ref().map(Folder::failed);
@@ -107,11 +111,22 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
             || write_failed.as_ref().is_some_and(|failed| failed.load(Ordering::Relaxed));
         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let result = pkm_run::run(&program, &machine, &options, outputs, progress);
+    let checked = pkm_run::check_with(&program, &machine, &options, |step: &Programmed<'_>| {
+        if let Some(report) = &mut report {
+            report.programmed(step);
+        }
+    })?;
+    let judged = |_: &mut Files, judged: &Judged| {
+        if let Some(report) = &mut report {
+            report.judged(judged);
+        }
+    };
+    let result = pkm_run::run_checked(&program, &machine, &options, checked, outputs, progress, judged);
     bar.finish_and_clear();
     let (summary, files) = result?;
-    if let (Some(folder), Some(files), Some(summary_file)) = (folder, files, summary_file) {
-        save(folder, files, summary_file, &summary)?;
+    if let (Some(folder), Some(summary_file)) = (folder, summary_file) {
+        let page = report.zip(report_file);
+        save(folder, files, page, summary_file, &program, &summary)?;
     }
     if let (Some(kept), Some(parameters)) = (&kept, &summary.parameters) {
         kept.save(parameters)?;
@@ -141,20 +156,36 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
 }
 
 /// Ends all files and puts them in place; the first error of any of them is the answer.
-fn save(folder: Folder, files: Files, mut summary_file: Pending, summary: &Summary) -> Result<(), Failure> {
+/// Nothing moved: then only the report is new, and says why.
+fn save(
+    folder: Folder,
+    files: Option<Files>,
+    page: Option<(Recorder<'_>, Pending)>,
+    mut summary_file: Pending,
+    program: &Program,
+    summary: &Summary,
+) -> Result<(), Failure> {
     let mut done = Vec::new();
     let told = |name: &str, error: &std::io::Error| folder.failure(name, error);
-    if let Some(vcd) = files.vcd {
-        done.push(vcd.finish().map_err(|error| told("steps.vcd", &error))?);
+    if let Some(files) = files {
+        if let Some(vcd) = files.vcd {
+            done.push(vcd.finish().map_err(|error| told("steps.vcd", &error))?);
+        }
+        if let Some(trace) = files.trace {
+            done.push(trace.finish().map_err(|error| told("trace.csv", &error))?);
+        }
+        if let Some(stream) = files.stream {
+            done.push(stream.finish().map_err(|error| told("steps.pkms", &error))?);
+        }
+        writeln!(summary_file, "{}", summary::json(summary)?)
+            .map_err(|error| told("summary.json", &error))?;
+        done.push(summary_file);
     }
-    if let Some(trace) = files.trace {
-        done.push(trace.finish().map_err(|error| told("trace.csv", &error))?);
+    if let Some((report, mut file)) = page {
+        let text = program.read().map_err(|error| told("report.html", &error))?;
+        report.write(summary, text, &mut file).map_err(|error| told("report.html", &error))?;
+        done.push(file);
     }
-    if let Some(stream) = files.stream {
-        done.push(stream.finish().map_err(|error| told("steps.pkms", &error))?);
-    }
-    writeln!(summary_file, "{}", summary::json(summary)?).map_err(|error| told("summary.json", &error))?;
-    done.push(summary_file);
     folder.commit(done)
 }
 
