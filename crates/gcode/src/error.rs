@@ -215,6 +215,8 @@ errors! {
     PolarPlane "polar-plane" "polar words outside the XY plane" "select G17";
     PolarMixed { letter: char } "polar-mixed" "polar words together with {letter}" "use either @ and ^, or axis words";
     PolarOrigin "polar-origin" "the position is the origin, so it has no angle to keep" "give ^ too";
+    IndexerFeed { letter: char } "indexer" "{letter} is a locking indexer: only G0 moves it" "move it by G0 in a block of its own";
+    IndexerAlone { letter: char } "indexer" "{letter} is a locking indexer: it moves alone" "move it by G0 in a block of its own";
     WrappedRange { letter: char, value: f64 } "wrapped-range" "{letter}{value} on a wrapped rotary axis" "use 0 to 360, the sign gives the direction";
     // Cycles.
     CycleR { code: Code } "cycle-r" "G{code} needs R when the cycle begins" "R is the height where feeding begins";

@@ -214,6 +214,8 @@ pub(crate) struct Modal {
     /// Slot of the tool chosen by T; -1 = none yet.
     pub(crate) selected_slot: i32,
     pub(crate) selected_tool: i32,
+    /// G43: the offset is that of the tool in the spindle.
+    pub(crate) follows_tool: bool,
     pub(crate) mist: bool,
     pub(crate) flood: bool,
     pub(crate) feed_override: bool,
@@ -241,6 +243,7 @@ impl Modal {
             spindles: [spindle; 8],
             selected_slot: -1,
             selected_tool: 0,
+            follows_tool: false,
             mist: false,
             flood: false,
             feed_override: true,

@@ -55,6 +55,34 @@ pub struct Settings {
     pub spindles: u8,
     /// M codes of the machine's own; none by default.
     pub machine_codes: MachineCodes,
+    /// A, B, C go round: in G90 a value from 0 to below 360 is a position, its sign the direction; one turn at most.
+    pub wrapped_rotary: [bool; 3],
+    /// A, B, C are locked while the machine cuts: each moves alone, and only by G0.
+    pub locking_indexer: [bool; 3],
+    /// M6 first moves Z to machine zero.
+    pub tool_change_quill_up: bool,
+    /// M6 first moves to the G30 position.
+    pub tool_change_at_g30: bool,
+    /// M6 leaves the spindle turning.
+    pub tool_change_with_spindle_on: bool,
+    /// M6 while G43 is in force takes the new tool's offset; T0 M6 cancels it.
+    pub retain_g43: bool,
+    /// A sub finds the number of its arguments in `#<n_args>`.
+    pub oword_nargs: bool,
+    /// Added to the angle of M19, degrees.
+    pub orient_offset_deg: f64,
+    /// The end of the program leaves the coordinate system as it is (LinuxCNC 2.10 and pkm).
+    pub keeps_system_at_end: bool,
+    /// The end of the program takes G52 and G92 back (LinuxCNC 2.10 and pkm).
+    pub forgets_g92_at_end: bool,
+    /// How far G73 backs off without a D word, program units (LinuxCNC 2.10 and pkm); `None` = 1 mm or 0.05 in.
+    pub g73_clearance: Option<f64>,
+    /// The same of G83.
+    pub g83_clearance: Option<f64>,
+    /// Tolerance of G64 without P, and of its naive CAM without Q (LinuxCNC 2.10 and pkm), program units.
+    pub g64_tolerance: f64,
+    /// See [`Settings::g64_tolerance`].
+    pub g64_naivecam_tolerance: f64,
     /// Accepted difference of an arc's two radii, inch program.
     pub arc_radius_tolerance_inch: f64,
     /// The same, mm program.
@@ -79,6 +107,20 @@ impl Default for Settings {
             block_delete: false,
             spindles: 1,
             machine_codes: MachineCodes::default(),
+            wrapped_rotary: [false; 3],
+            locking_indexer: [false; 3],
+            tool_change_quill_up: false,
+            tool_change_at_g30: false,
+            tool_change_with_spindle_on: false,
+            retain_g43: false,
+            oword_nargs: false,
+            orient_offset_deg: 0.0,
+            keeps_system_at_end: false,
+            forgets_g92_at_end: false,
+            g73_clearance: None,
+            g83_clearance: None,
+            g64_tolerance: 0.0,
+            g64_naivecam_tolerance: 0.0,
             arc_radius_tolerance_inch: 0.002_828_4,
             arc_radius_tolerance_mm: 0.028_284,
             max_idle_blocks: 10_000_000,
@@ -89,6 +131,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// True where LinuxCNC 2.10 and pkm have something that 2.9 lacks.
+    pub(crate) fn is_newer(&self) -> bool {
+        self.dialect != Dialect::LinuxCnc29
+    }
+
     /// The machine that Debian's `rs274` simulates: an inch machine with the axes XYZABC, started in mm.
     pub fn rs274() -> Self {
         Self {

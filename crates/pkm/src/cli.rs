@@ -230,6 +230,9 @@ pub(crate) struct Canon {
     /// error), the old one kept as FILE.bak
     #[arg(long, value_name = "FILE")]
     pub parameters: Option<PathBuf>,
+    /// LinuxCNC's INI file: settings of the interpreter, as for `rs274 -i`
+    #[arg(long, value_name = "FILE")]
+    pub ini: Option<PathBuf>,
     /// The machine's length unit is the inch, as in LinuxCNC's rs274 (the default)
     #[arg(long, conflicts_with = "mm")]
     pub inch: bool,

@@ -90,6 +90,7 @@ impl State {
         }
 
         let end = self.end_point(block)?;
+        self.no_indexer(&end, block)?;
         let from = [self.position[axes.first], self.position[axes.second]];
         let to = [end[axes.first], end[axes.second]];
         let centre = match block.get(b'R') {

@@ -31,6 +31,8 @@ struct Cycle {
     p: f64,
     q: f64,
     ijk: [f64; 3],
+    /// How far G73 and G83 back off.
+    clearance: f64,
     /// The spindle turns as the cycle needs it.
     spindle_ready: bool,
 }
@@ -201,7 +203,20 @@ impl State {
             _ => true,
         };
         let CycleMemory { p, q, ijk, .. } = *memory;
-        Ok(Cycle { code, axes, r, bottom, clear, p, q, ijk, spindle_ready })
+        let clearance = self.peck_clearance(code, block);
+        Ok(Cycle { code, axes, r, bottom, clear, p, q, ijk, clearance, spindle_ready })
+    }
+}
+
+impl State {
+    /// How far G73 and G83 back off: fixed in 2.9, else the D word or what the machine says.
+    fn peck_clearance(&self, code: GCode, block: &Block) -> f64 {
+        let inch = self.modal.units == LengthUnit::Inch;
+        if !self.settings.is_newer() {
+            return if inch { 0.010 } else { 0.254 };
+        }
+        let set = if code == G73 { self.settings.g73_clearance } else { self.settings.g83_clearance };
+        block.get(b'D').or(set).unwrap_or(if inch { 0.05 } else { 1.0 })
     }
 }
 
@@ -214,10 +229,7 @@ fn drill(cycle: &Cycle, modal: &mut Modal, settings: &crate::Settings, hole: &mu
     let stop = Canon::StopSpindle { spindle };
     match code {
         G73 | G83 => {
-            let clearance = match modal.units {
-                LengthUnit::Inch => 0.010,
-                LengthUnit::Mm => 0.254,
-            };
+            let clearance = cycle.clearance;
             let mut depth = r - q;
             while depth > bottom {
                 hole.feed(depth);

@@ -10,8 +10,10 @@ impl State {
     /// Ends the program; units, path mode, retract mode, tool offset and arc mode stay (dialect section 15).
     pub(crate) fn end_program(&mut self, number: i32, out: &mut Out<'_>) {
         let machine = self.machine_point(self.position);
-        self.load_system(1);
-        self.parameters.set(parameters::SYSTEM, 1.0);
+        if !(self.settings.keeps_system_at_end && self.settings.is_newer()) {
+            self.load_system(1);
+            self.parameters.set(parameters::SYSTEM, 1.0);
+        }
         self.position = self.program_point(machine);
         out.emit(self.g5x_command());
         out.emit(Canon::SetXyRotation(self.rotation_deg));
@@ -50,6 +52,11 @@ impl State {
         if self.modal.flood {
             self.modal.flood = false;
             out.emit(Canon::Flood(false));
+        }
+        if self.settings.forgets_g92_at_end && self.settings.is_newer() {
+            self.keep_machine_point(|state| state.g92 = [0.0; 9]);
+            self.parameters.set(parameters::G92_APPLIED, 0.0);
+            out.emit(self.g92_command());
         }
         if number == 30 {
             out.emit(Canon::PalletShuttle);

@@ -19,7 +19,7 @@ impl State {
         }
     }
 
-    /// 2.9 refuses spindles that there are: M51 any, M19 "all" (checked with rs274 2.9).
+    /// 2.9 refuses spindles that there are: M51 the first and "all", M19 "all" (checked with rs274 2.9).
     fn refuse_spindle_word(&self, refused: impl Fn(f64) -> bool, block: &Block) -> Result<(), Error> {
         match block.get(b'$') {
             Some(value) if refused(value) => {
@@ -148,7 +148,11 @@ impl State {
         for spindle in self.spindles_of(block, 0) {
             if angle.is_some() || way.is_some() {
                 self.spindle_at(spindle).turning = None;
-                out.emit(Canon::OrientSpindle { spindle, angle: angle.unwrap_or(0.0), mode });
+                out.emit(Canon::OrientSpindle {
+                    spindle,
+                    angle: angle.unwrap_or(0.0) + self.settings.orient_offset_deg,
+                    mode,
+                });
             }
             if let Some(timeout) = timeout {
                 out.emit(Canon::WaitOrientComplete { spindle, timeout });
@@ -199,9 +203,10 @@ impl State {
             50 => self.set_feed_override(on, out),
             51 => {
                 if self.settings.dialect == Dialect::LinuxCnc29 {
-                    self.refuse_spindle_word(|_| true, block)?;
+                    self.refuse_spindle_word(|n| n <= 0.0, block)?;
                 }
-                for spindle in self.spindles_of(block, 0) {
+                let otherwise = if self.settings.is_newer() { 0 } else { -1 };
+                for spindle in self.spindles_of(block, otherwise) {
                     self.set_speed_override(spindle, on, out);
                 }
             }
@@ -371,14 +376,30 @@ impl State {
         if self.modal.compensation.is_some() {
             return Err(block.g_error(GGroup::Path, ErrorKind::CcOn { what: "another path mode" }));
         }
+        let newer = self.settings.is_newer();
         self.modal.path = match code {
             610 => MotionControlMode::ExactPath,
             611 => MotionControlMode::ExactStop,
-            _ => MotionControlMode::Continuous { tolerance: block.get(b'P').unwrap_or(0.0) },
+            _ => {
+                let default = if newer { self.settings.g64_tolerance } else { 0.0 };
+                MotionControlMode::Continuous { tolerance: block.get(b'P').unwrap_or(default) }
+            }
         };
+        if newer
+            && code == G64
+            && let Some(r) = block.get(b'R')
+        {
+            // R 0 or less asks for trapezoidal profiles, else for S curves, so aggressive in corners.
+            let (kind, peak_scale) = if r <= 0.0 { (0, 1.0) } else { (1, r.clamp(0.1, 1.0)) };
+            out.emit(Canon::SetPlannerMode { kind, peak_scale });
+        }
         out.emit(Canon::SetMotionControlMode(self.modal.path));
         if let MotionControlMode::Continuous { tolerance } = self.modal.path {
-            self.modal.naivecam_tolerance = block.get(b'Q').unwrap_or(tolerance);
+            let default = match (newer, block.has(b'P')) {
+                (true, false) => self.settings.g64_naivecam_tolerance,
+                _ => tolerance,
+            };
+            self.modal.naivecam_tolerance = block.get(b'Q').unwrap_or(default);
             out.emit(Canon::SetNaivecamTolerance(self.modal.naivecam_tolerance));
         }
         Ok(())

@@ -1,10 +1,11 @@
 //! Straight moves: G0, G1, G53, polar words, inverse time.
 
 use super::{Out, state::State};
-use crate::block::Block;
+use crate::block::{AXIS_LETTERS, Block};
 use crate::error::{Code, Error, ErrorKind};
 use crate::modal::*;
-use pkm_canon::{Canon, Plane, Position};
+use crate::settings::Dialect;
+use pkm_canon::{Canon, MotionControlMode, Plane, Position};
 use pkm_kins::maths;
 
 impl State {
@@ -13,6 +14,7 @@ impl State {
         if code == G1 {
             self.check_feed(code, block)?;
         }
+        let before = self.modal.motion;
         self.modal.motion = code;
         let end = self.end_point(block)?;
         if code == G1 {
@@ -24,6 +26,14 @@ impl State {
                 return Err(block.g_error(GGroup::NonModal, ErrorKind::CcOn { what: "G53" }));
             }
             return self.straight_compensated(code == G0, side, end, block, out);
+        }
+        if self.indexer(code, &end, block)?.is_some() {
+            // Not a motion that axis words alone go on with (checked with rs274 2.9).
+            if self.settings.dialect != Dialect::Pkm {
+                self.modal.motion = before;
+            }
+            self.turn_indexers(&end, out);
+            return Ok(());
         }
         self.position = end;
         let end = Position::from_array(end);
@@ -68,10 +78,72 @@ impl State {
         }
         for (axis, coordinate) in end.iter_mut().enumerate() {
             if let Some(value) = block.axis(axis) {
-                *coordinate = if self.modal.incremental { *coordinate + value } else { value };
+                *coordinate = match self.modal.incremental {
+                    true => *coordinate + value,
+                    false => self.unwrapped(axis, value, *coordinate, block)?,
+                };
             }
         }
         Ok(end)
+    }
+
+    /// Where an absolute word of a wrapped rotary axis leads: its size is the position within a turn, its sign the
+    /// direction (checked with rs274 2.9).
+    fn unwrapped(&self, axis: usize, value: f64, present: f64, block: &Block) -> Result<f64, Error> {
+        if !(3..6).contains(&axis) || !self.settings.wrapped_rotary[axis - 3] {
+            return Ok(value);
+        }
+        self.check_wrapped(axis, value, block)?;
+        Ok(next_turn(value.abs(), value.is_sign_negative(), present))
+    }
+
+    /// A word of a wrapped rotary axis is less than a turn.
+    pub(crate) fn check_wrapped(&self, axis: usize, value: f64, block: &Block) -> Result<(), Error> {
+        if (3..6).contains(&axis) && self.settings.wrapped_rotary[axis - 3] && value.abs() >= 360.0 {
+            let letter = AXIS_LETTERS[axis];
+            return Err(block.word_error(letter, ErrorKind::WrappedRange { letter: letter.into(), value }));
+        }
+        Ok(())
+    }
+
+    /// A locking indexer moves alone, by G0. `None` = no indexer moves.
+    fn indexer(&self, code: GCode, end: &[f64; 9], block: &Block) -> Result<Option<usize>, Error> {
+        let moves = |axis: usize| end[axis] != self.position[axis];
+        let Some(axis) = (3..6).find(|axis| self.settings.locking_indexer[axis - 3] && moves(*axis)) else {
+            return Ok(None);
+        };
+        let letter = AXIS_LETTERS[axis];
+        if code != G0 {
+            return Err(block.word_error(letter, ErrorKind::IndexerFeed { letter: letter.into() }));
+        }
+        if (0..9).any(|other| other != axis && moves(other)) {
+            return Err(block.word_error(letter, ErrorKind::IndexerAlone { letter: letter.into() }));
+        }
+        Ok(Some(axis))
+    }
+
+    /// Brings every locking indexer to where `end` has it, one after the other, in exact path.
+    pub(crate) fn turn_indexers(&mut self, end: &[f64; 9], out: &mut Out<'_>) {
+        for axis in 3..6 {
+            if !self.settings.locking_indexer[axis - 3] || self.position[axis] == end[axis] {
+                continue;
+            }
+            let path = self.modal.path;
+            if path != MotionControlMode::ExactPath {
+                out.emit(Canon::SetMotionControlMode(MotionControlMode::ExactPath));
+            }
+            self.position[axis] = end[axis];
+            out.emit(Canon::StraightTraverse(Position::from_array(self.position)));
+            if path != MotionControlMode::ExactPath {
+                out.emit(Canon::SetMotionControlMode(path));
+                out.emit(Canon::SetNaivecamTolerance(self.modal.naivecam_tolerance));
+            }
+        }
+    }
+
+    /// No feed moves an indexer.
+    pub(crate) fn no_indexer(&self, end: &[f64; 9], block: &Block) -> Result<(), Error> {
+        self.indexer(G1, end, block).map(|_| ())
     }
 
     /// G53: the words are machine coordinates; other axes stay. For A B C the tool offset is *not* taken off
@@ -88,6 +160,19 @@ impl State {
         }
         self.keep_rotary_tool_offset(&mut machine);
         let mut end = self.program_point(machine);
+        for axis in 3..6 {
+            if let Some(value) = block.axis(axis)
+                && self.settings.wrapped_rotary[axis - 3]
+            {
+                self.check_wrapped(axis, value, block)?;
+                // LinuxCNC drops the sign of the program coordinate (checked with rs274 2.9).
+                let degrees = match self.settings.dialect {
+                    Dialect::Pkm => value.abs() - (value - end[axis]),
+                    _ => end[axis].abs(),
+                };
+                end[axis] = next_turn(degrees, value.is_sign_negative(), self.position[axis]);
+            }
+        }
         // What was not named stays, bit for bit; X and Y are one where the system is turned.
         for (axis, coordinate) in end.iter_mut().enumerate() {
             let turned = axis < 2 && self.rotation_deg != 0.0 && block.has_any(b"XY");
@@ -119,6 +204,13 @@ impl State {
         };
         Ok([radius * maths::cos(angle), radius * maths::sin(angle)])
     }
+}
+
+/// The next angle that is `degrees` within its turn, from `present` in the direction of the sign.
+pub(crate) fn next_turn(degrees: f64, backwards: bool, present: f64) -> f64 {
+    let turns = maths::floor((present - degrees) / 360.0);
+    let below = degrees + 360.0 * turns;
+    if backwards || below == present { below } else { below + 360.0 }
 }
 
 fn first_polar(block: &Block) -> u8 {

@@ -72,6 +72,9 @@ impl State {
         if let Some(letter) = refused.iter().copied().find(|letter| block.has(*letter)) {
             return Err(block.word_error(letter, ErrorKind::OffsetWord { letter: letter.into(), l }));
         }
+        if l == 20 {
+            self.check_wrapped_words(block)?;
+        }
         let active = system == self.modal.system;
         if active {
             self.no_compensation(block, GGroup::NonModal, "G10 of the active coordinate system")?;
@@ -121,6 +124,13 @@ impl State {
         Ok(())
     }
 
+    fn check_wrapped_words(&self, block: &Block) -> Result<(), Error> {
+        (3..6).try_for_each(|axis| match block.axis(axis) {
+            Some(value) => self.check_wrapped(axis, value, block),
+            None => Ok(()),
+        })
+    }
+
     /// G10 L20: machine = R (p + g92) + offset + tool, with p as wanted; axes without a word keep their present
     /// reading in that system. In a turned system X and Y change together.
     fn offset_for_reading(&self, block: &Block, rotation_deg: f64, offset: &mut [f64; 9]) {
@@ -146,17 +156,25 @@ impl State {
     pub(crate) fn go_home(&mut self, code: GCode, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         self.no_compensation(block, GGroup::NonModal, "a move to the stored position")?;
         let by = self.end_point(block)?;
+        self.turn_indexers(&by, out);
+        self.position = by;
         out.emit(Canon::StraightTraverse(Position::from_array(by)));
         let first = if code == G28 { parameters::G28_HOME } else { parameters::G30_HOME };
         let mut home = self.program_units(self.parameters.nine(first));
         self.keep_rotary_tool_offset(&mut home);
-        let home = self.program_point(home);
+        let mut home = self.program_point(home);
+        for axis in 3..6 {
+            if self.settings.wrapped_rotary[axis - 3] {
+                home[axis] = super::motion::next_turn(home[axis], false, by[axis]);
+            }
+        }
         let all = !block.has_axis();
         let end = core::array::from_fn(
             |axis| {
                 if all || block.axis(axis).is_some() { home[axis] } else { by[axis] }
             },
         );
+        self.turn_indexers(&end, out);
         self.position = end;
         out.emit(Canon::StraightTraverse(Position::from_array(end)));
         Ok(())
@@ -176,7 +194,12 @@ impl State {
     pub(crate) fn store_home(&mut self, code: GCode, block: &Block) -> Result<(), Error> {
         self.no_compensation(block, GGroup::NonModal, "storing the position")?;
         let first = if code == G28_1 { parameters::G28_HOME } else { parameters::G30_HOME };
-        let machine = self.machine_units(self.machine_point(self.position));
+        let mut machine = self.machine_units(self.machine_point(self.position));
+        for (angle, _) in
+            machine[3..6].iter_mut().zip(self.settings.wrapped_rotary).filter(|(_, wrapped)| *wrapped)
+        {
+            *angle -= 360.0 * maths::floor(*angle / 360.0);
+        }
         self.parameters.set_nine(first, &machine);
         Ok(())
     }
@@ -190,6 +213,7 @@ impl State {
     /// G92: the present point reads the given values.
     pub(crate) fn g92_set(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         self.no_compensation(block, GGroup::NonModal, "G92")?;
+        self.check_wrapped_words(block)?;
         for axis in 0..9 {
             if let Some(value) = block.axis(axis) {
                 self.g92[axis] += self.position[axis] - value;
@@ -204,6 +228,7 @@ impl State {
     /// G52: a local offset; it shares its storage with G92.
     pub(crate) fn local_offset(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         self.no_compensation(block, GGroup::NonModal, "G52")?;
+        self.check_wrapped_words(block)?;
         for axis in 0..9 {
             if let Some(value) = block.axis(axis) {
                 self.position[axis] += self.g92[axis] - value;

@@ -16,6 +16,7 @@ impl State {
             return Err(block.motion_error(ErrorKind::ProbeFeed));
         }
         let end = self.end_point(block)?;
+        self.no_indexer(&end, block)?;
         let probe = Probe { away: matches!(code, 384 | G38_5), must_trip: matches!(code, G38_2 | 384) };
         if probe.must_trip && end == self.position {
             return Err(block.motion_error(ErrorKind::ProbeShort { code: Code(code) }));

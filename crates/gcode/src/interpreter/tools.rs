@@ -38,10 +38,13 @@ impl State {
                 if self.settings.dialect == Dialect::LinuxCnc29 {
                     out.emit(Canon::StartChange);
                 }
-                for spindle in 0..self.settings.spindles.min(8) {
-                    self.modal.spindles[usize::from(spindle)].turning = None;
-                    out.emit(Canon::StopSpindle { spindle: spindle.into() });
+                if !self.settings.tool_change_with_spindle_on {
+                    for spindle in 0..self.settings.spindles.min(8) {
+                        self.modal.spindles[usize::from(spindle)].turning = None;
+                        out.emit(Canon::StopSpindle { spindle: spindle.into() });
+                    }
                 }
+                self.move_to_tool_change(out);
                 let (slot, tool) = (self.modal.selected_slot.max(0), self.modal.selected_tool);
                 out.emit(Canon::ChangeTool { slot, tool });
                 // rs274 copies the slot to slot 0: with T0 the tool stays (checked with rs274 2.9).
@@ -49,6 +52,13 @@ impl State {
                     self.tools.load_spindle(slot);
                 }
                 self.loaded_slot = slot;
+                if self.settings.retain_g43 && self.modal.follows_tool {
+                    let tool = self.tools.get(slot).copied().filter(|_| slot > 0).unwrap_or_default();
+                    let offset = self.program_units(tool.offset.to_array());
+                    self.modal.follows_tool = slot > 0;
+                    self.keep_machine_point(|state| state.tool_offset = offset);
+                    out.emit(Canon::UseToolLengthOffset(Position::from_array(offset)));
+                }
                 Ok(true)
             }
             Some(number) => {
@@ -123,9 +133,35 @@ impl State {
             }
             _ => [0.0; 9],
         };
+        self.modal.follows_tool = code == G43;
         self.keep_machine_point(|state| state.tool_offset = offset);
         out.emit(Canon::UseToolLengthOffset(Position::from_array(offset)));
         Ok(())
+    }
+
+    /// The moves that a machine makes before it changes the tool: Z to machine zero, then to the G30 position.
+    fn move_to_tool_change(&mut self, out: &mut Out<'_>) {
+        let mut go = |state: &mut Self, machine: [f64; 9], only_z: bool| {
+            let target = state.program_point(machine);
+            out.remark("AXIS,hide");
+            match only_z {
+                true => state.position[2] = target[2],
+                false => {
+                    state.turn_indexers(&target, out);
+                    state.position = target;
+                }
+            }
+            out.emit(Canon::StraightTraverse(Position::from_array(state.position)));
+            out.remark("AXIS,show");
+        };
+        if self.settings.tool_change_quill_up {
+            go(self, [0.0; 9], true);
+        }
+        if self.settings.tool_change_at_g30 {
+            let mut home = self.program_units(self.parameters.nine(crate::parameters::G30_HOME));
+            self.keep_rotary_tool_offset(&mut home);
+            go(self, home, false);
+        }
     }
 
     /// G10 L0, L1, L10, L11.

@@ -39,20 +39,25 @@ fn stream(text: &[u8]) -> Vec<String> {
 
 /// The program as pkm interprets it, on the machine that `rs274` simulates.
 pub fn pkm(program: &[u8]) -> Outcome {
-    interpret(&mut MemorySource::new(program), TOOLS.as_bytes(), None)
+    interpret(Settings::rs274(), &mut MemorySource::new(program), TOOLS.as_bytes(), None)
 }
 
 /// A program file as pkm interprets it, with a tool table; subroutine files stand beside it.
 pub fn pkm_file(program: &Path, tools: &[u8]) -> Outcome {
     let beside = program.parent().expect("a folder").to_path_buf();
-    interpret(&mut FileSource::open(program, vec![beside]).expect("a file"), tools, None)
+    interpret(Settings::rs274(), &mut FileSource::open(program, vec![beside]).expect("a file"), tools, None)
 }
 
 /// What `rs274` has interpreted last in that directory, with the parameters it began with.
 pub fn pkm_after(directory: &Path, variables: Option<&str>) -> Outcome {
+    pkm_with(Settings::rs274(), directory, variables)
+}
+
+/// [`pkm_after`] with other settings.
+pub fn pkm_with(settings: Settings, directory: &Path, variables: Option<&str>) -> Outcome {
     let program = directory.join("program.ngc");
     let mut source = FileSource::open(&program, vec![directory.to_path_buf()]).expect("a file");
-    interpret(&mut source, TOOLS.as_bytes(), variables)
+    interpret(settings, &mut source, TOOLS.as_bytes(), variables)
 }
 
 /// The numbers and values of a parameter file.
@@ -64,12 +69,17 @@ fn kept(text: &[u8]) -> Vec<(i32, f64)> {
     text_of(text).lines().filter_map(number).collect()
 }
 
-fn interpret(source: &mut dyn LineSource, tools: &[u8], variables: Option<&str>) -> Outcome {
+fn interpret(
+    settings: Settings,
+    source: &mut dyn LineSource,
+    tools: &[u8],
+    variables: Option<&str>,
+) -> Outcome {
     let tools = ToolTable::parse(tools, |_, _| {}).expect("a small table");
     let mut output: Vec<u8> = Vec::new();
     let mut writer = TextWriter::new(|bytes: &[u8]| output.extend_from_slice(bytes), Spelling::V2_9);
     let (mut failed_block, mut message) = (None, String::new());
-    let mut interpreter = Interpreter::new(Settings::rs274());
+    let mut interpreter = Interpreter::new(settings);
     *interpreter.tools_mut() = tools;
     let file = variables.map(|text| {
         ParameterFile::read(text.as_bytes(), interpreter.parameters_mut()).expect("a parameter file")
@@ -90,6 +100,16 @@ pub fn has_rs274() -> bool {
 
 /// The program as `rs274 -g` interprets it, with the subroutine files beside it; `None` if it does not end in time.
 pub fn rs274(program: &[u8], directory: &Path, variables: Option<&str>) -> Option<Outcome> {
+    rs274_with(program, directory, variables, None)
+}
+
+/// [`rs274`] with an INI file.
+pub fn rs274_with(
+    program: &[u8],
+    directory: &Path,
+    variables: Option<&str>,
+    ini: Option<&str>,
+) -> Option<Outcome> {
     let file = directory.join("program.ngc");
     let tools = directory.join("tool.tbl");
     write(&file, program);
@@ -97,11 +117,20 @@ pub fn rs274(program: &[u8], directory: &Path, variables: Option<&str>) -> Optio
     for (name, text) in generator::SUB_FILES {
         write(&directory.join(name), text.as_bytes());
     }
-    let Some(variables) = variables else { return run_rs274(&file, &tools, directory, &[]) };
-    let path = directory.join("variables");
-    write(&path, variables.as_bytes());
-    let mut outcome = run_rs274(&file, &tools, directory, &[OsStr::new("-v"), path.as_os_str()])?;
-    outcome.kept = kept(&std::fs::read(&path).expect("the parameter file"));
+    let mut options: Vec<&OsStr> = Vec::new();
+    let (ini_path, path) = (directory.join("machine.ini"), directory.join("variables"));
+    if let Some(ini) = ini {
+        write(&ini_path, ini.as_bytes());
+        options.extend([OsStr::new("-i"), ini_path.as_os_str()]);
+    }
+    if let Some(variables) = variables {
+        write(&path, variables.as_bytes());
+        options.extend([OsStr::new("-v"), path.as_os_str()]);
+    }
+    let mut outcome = run_rs274(&file, &tools, directory, &options)?;
+    if variables.is_some() {
+        outcome.kept = kept(&std::fs::read(&path).expect("the parameter file"));
+    }
     Some(outcome)
 }
 

@@ -1,6 +1,7 @@
 //! `pkm canon`: canonical commands as LinuxCNC's `rs274 -g` prints them.
 
 use crate::cli::{Canon, CanonFormat, Dialect, OnError};
+use crate::commands::ini::Ini;
 use crate::commands::parameters::Kept;
 use crate::commands::{program, tool_table};
 use crate::outcome::{Failure, Outcome};
@@ -28,7 +29,19 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
         Some(path) => tool_table::read(path, messages)?,
         None => ToolTable::default(),
     };
-    let mut interpreter = Interpreter::new(settings(arguments));
+    let ini = arguments.ini.as_deref().map(Ini::read).transpose()?;
+    let mut settings = settings(arguments);
+    if let Some(ini) = &ini {
+        ini.apply(&mut settings)?;
+        let chosen = arguments.inch || arguments.mm || arguments.format == CanonFormat::Motion9;
+        if let Some(units) = ini.machine_units_per_mm()?
+            && arguments.dialect != Dialect::LinuxCnc29
+            && !chosen
+        {
+            settings.machine_units_per_mm = units;
+        }
+    }
+    let mut interpreter = Interpreter::new(settings);
     *interpreter.tools_mut() = tools;
     let kept = match &arguments.parameters {
         Some(path) => {
@@ -42,7 +55,9 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
         Program::File(path) => {
             // Subroutine files are looked for beside the program.
             let beside = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-            Box::new(FileSource::open(path, vec![beside]).map_err(|error| {
+            let mut folders = vec![beside];
+            folders.extend(ini.as_ref().map(Ini::subroutine_path).unwrap_or_default());
+            Box::new(FileSource::open(path, folders).map_err(|error| {
                 let message = format!("cannot read {name}: {error}");
                 Failure::could_not("file-open", &name, message, "check the path and its permissions")
             })?)

@@ -117,7 +117,11 @@ impl Interpreter {
         }
         self.nothing_more(at)?;
         self.state.set_return_value(None);
-        self.enter(word.name.label, Style::OWord, word.span, 1, Some(arguments), source)
+        self.enter(word.name.label, Style::OWord, word.span, 1, Some(arguments), source)?;
+        if self.state.settings.oword_nargs {
+            let _ = self.state.parameters.set_named(b"n_args", count as f64);
+        }
+        Ok(())
     }
 
     /// Begins a call: from a definition already passed, from a file of that name, or further on in this file.
