@@ -124,15 +124,15 @@ impl State {
 
     /// Brings every locking indexer to where `end` has it, one after the other, in exact path.
     pub(crate) fn turn_indexers(&mut self, end: &[f64; 9], out: &mut Out<'_>) {
-        for axis in 3..6 {
-            if !self.settings.locking_indexer[axis - 3] || self.position[axis] == end[axis] {
+        for (axis, &angle) in end.iter().enumerate().skip(3).take(3) {
+            if !self.settings.locking_indexer[axis - 3] || self.position[axis] == angle {
                 continue;
             }
             let path = self.modal.path;
             if path != MotionControlMode::ExactPath {
                 out.emit(Canon::SetMotionControlMode(MotionControlMode::ExactPath));
             }
-            self.position[axis] = end[axis];
+            self.position[axis] = angle;
             out.emit(Canon::StraightTraverse(Position::from_array(self.position)));
             if path != MotionControlMode::ExactPath {
                 out.emit(Canon::SetMotionControlMode(path));
@@ -160,17 +160,17 @@ impl State {
         }
         self.keep_rotary_tool_offset(&mut machine);
         let mut end = self.program_point(machine);
-        for axis in 3..6 {
+        for (axis, angle) in end.iter_mut().enumerate().skip(3).take(3) {
             if let Some(value) = block.axis(axis)
                 && self.settings.wrapped_rotary[axis - 3]
             {
                 self.check_wrapped(axis, value, block)?;
                 // LinuxCNC drops the sign of the program coordinate (checked with rs274 2.9).
                 let degrees = match self.settings.dialect {
-                    Dialect::Pkm => value.abs() - (value - end[axis]),
-                    _ => end[axis].abs(),
+                    Dialect::Pkm => value.abs() - (value - *angle),
+                    _ => angle.abs(),
                 };
-                end[axis] = next_turn(degrees, value.is_sign_negative(), self.position[axis]);
+                *angle = next_turn(degrees, value.is_sign_negative(), self.position[axis]);
             }
         }
         // What was not named stays, bit for bit; X and Y are one where the system is turned.
