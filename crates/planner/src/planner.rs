@@ -264,10 +264,15 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             return Err(PushError::Plan(PlanError { kind: PlanErrorKind::NoFeed, span: next.span, pose }));
         }
         let mut found = None;
-        self.limits.walk(&self.kinematics, &next.geometry, walk::places(&next.geometry), |pose, outcome| {
-            found = outcome.err().map(|kind| PlanError { kind, span: next.span, pose: *pose });
-            if found.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
+        self.limits.walk(
+            &self.kinematics,
+            &next.geometry,
+            (walk::places(&next.geometry), false),
+            |pose, outcome| {
+                found = outcome.err().map(|kind| PlanError { kind, span: next.span, pose: *pose });
+                if found.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            },
+        );
         if let Some(error) = found {
             self.fault = Some(error);
             return Err(PushError::Plan(error));

@@ -24,7 +24,7 @@ pub(crate) fn places(geometry: &Geometry) -> u32 {
 
 impl<const R: usize> Limits<R> {
     /// Looks at `places` + 1 places evenly along `geometry`, and at where a joint or an axis turns back between them.
-    /// `each` gets the pose and the distance from singularities, or what is wrong there; it may end the walk.
+    /// `each` gets the pose and the distance from singularities (infinite unless `measure`d or guarded), or what is wrong there; it may end the walk.
     ///
     /// Between the places a joint is taken for a parabola through three of them: travel is judged with an error of the
     /// third order in their distance.
@@ -32,7 +32,7 @@ impl<const R: usize> Limits<R> {
         &self,
         kinematics: &K,
         geometry: &Geometry,
-        places: u32,
+        (places, measure): (u32, bool),
         mut each: impl FnMut(&Pose, Result<Singularity, PlanErrorKind>) -> ControlFlow<()>,
     ) {
         let (length, places) = (geometry.length(), places.max(1));
@@ -48,6 +48,11 @@ impl<const R: usize> Limits<R> {
             let looked = kinematics.motion(&pose, &first, &second).map_err(PlanErrorKind::Unreachable);
             let found = looked.and_then(|motion| {
                 self.check_travel(&pose, &motion.position)?;
+                if !measure && !(self.singularity_guard > 0.0) {
+                    let far =
+                        Singularity { inverse: f64::INFINITY, inverse_joint: 0, forward: f64::INFINITY };
+                    return Ok((self.row_values(&pose, &motion.position), far));
+                }
                 let near = kinematics.singularity(&pose).map_err(PlanErrorKind::Unreachable)?;
                 let measure = near.inverse.min(near.forward);
                 if self.singularity_guard > 0.0 && !(measure >= self.singularity_guard) {
