@@ -209,14 +209,18 @@ pub(crate) fn wire_all_switches(
     Ok(())
 }
 
-/// Spindle and probe, behind everything else.
-pub(crate) fn wire_spindle_and_probe(hal: &mut Hal, config: &SimulationConfig) -> Result<(), HalError> {
+/// Spindle and probe, behind everything else. Returns the spindle's place among the components.
+pub(crate) fn wire_spindle_and_probe(
+    hal: &mut Hal,
+    config: &SimulationConfig,
+) -> Result<Option<usize>, HalError> {
+    let place = config.spindle.map(|_| hal.components().count());
     if let Some(spindle) = &config.spindle {
         Spindle::load(hal, spindle)?;
         hal.addf("spindle.0.update", THREAD)?;
     }
     if config.workpiece.is_empty() {
-        return Ok(());
+        return Ok(place);
     }
     Probe::load(hal, &config.workpiece)?;
     for (letter, axis) in [("x", Axis::X), ("y", Axis::Y), ("z", Axis::Z)] {
@@ -227,5 +231,6 @@ pub(crate) fn wire_spindle_and_probe(hal: &mut Hal, config: &SimulationConfig) -
         }
     }
     hal.net("probe", &["probe.0.tripped", "motion.probe-input"])?;
-    hal.addf("probe.0.update", THREAD)
+    hal.addf("probe.0.update", THREAD)?;
+    Ok(place)
 }

@@ -70,7 +70,6 @@ struct Lines {
 const MOTION: usize = 0;
 const STEPGEN: usize = 1;
 const DRIVER: usize = 2;
-const SPINDLE: usize = 4;
 
 /// The simulated machine. `Clone` forks it.
 #[derive(Clone)]
@@ -85,7 +84,8 @@ pub struct Simulation {
     axes: AxisSet,
     enable: BitPin,
     probe_input: BitPin,
-    has_spindle: bool,
+    /// Its place among the components, if there is one.
+    spindle: Option<usize>,
     tick: u64,
     /// Edges of the period in order of time, per joint and of all.
     joint_edges: Vec<Vec<Edge>>,
@@ -147,14 +147,14 @@ impl Simulation {
         Drivers::load(&mut hal, &drivers)?;
         Motors::load(&mut hal, &motors)?;
         wire(&mut hal, count)?;
-        wire_spindle_and_probe(&mut hal, config)?;
+        let spindle = wire_spindle_and_probe(&mut hal, config)?;
         wire_all_switches(&mut hal, &config.joints, &origins)?;
 
         let mut simulation = Self {
             lines: lines(&hal, config, &origins)?,
             enable: hal.bit_pin("motion.enable")?,
             probe_input: hal.bit_pin("motion.probe-input")?,
-            has_spindle: config.spindle.is_some(),
+            spindle,
             hal,
             states: vec![JointState::default(); count],
             statistics: vec![JointStatistics::default(); count],
@@ -489,17 +489,15 @@ impl Simulation {
 
     /// What spindle and probe tell.
     fn feedback_now(&self) -> Feedback {
-        let spindle = match self.has_spindle {
-            true => part::<Spindle>(&self.hal, SPINDLE).feedback(),
-            false => Default::default(),
-        };
+        let spindle =
+            self.spindle.map_or_else(Default::default, |place| part::<Spindle>(&self.hal, place).feedback());
         let operator = self.motion().operator();
         Feedback { spindle, probe: self.hal.values().bit(self.probe_input), operator }
     }
 
     /// True if the machine has a spindle.
     pub const fn has_spindle(&self) -> bool {
-        self.has_spindle
+        self.spindle.is_some()
     }
 
     /// What the joints did so far.

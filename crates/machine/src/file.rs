@@ -56,6 +56,12 @@ pub struct Tables {
     /// `[homing]`
     #[serde(default)]
     pub homing: Homing,
+    /// `[spindle]`
+    #[serde(default)]
+    pub spindle: Spindle,
+    /// `[probe]`
+    #[serde(default)]
+    pub probe: Probe,
     /// `[driver]`: for every joint that has none of its own.
     pub driver: Option<Spanned<Driver>>,
     /// `[[joint]]`, in joint order.
@@ -114,6 +120,27 @@ pub struct Singularity {
     pub guard: Option<Number>,
     /// A program that comes nearer than this is warned about; 0.05 if absent.
     pub warn: Option<Number>,
+}
+
+/// `[spindle]`
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spindle {
+    /// Faster it does not turn; 6000 if absent.
+    pub max_speed_rpm: Option<Number>,
+    /// How fast it speeds up and slows down; 3000 if absent.
+    pub acceleration_rpm_s: Option<Number>,
+    /// Longest wait for its speed and its index; 30 if absent.
+    pub timeout_s: Option<Number>,
+}
+
+/// `[probe]`
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// What the probe can touch; see [`crate::workpiece`].
+    #[serde(default)]
+    pub workpiece: Vec<Spanned<String>>,
 }
 
 /// `[driver]` or a joint's `driver`: a known model or own minima, and the times to use (the minima if absent).

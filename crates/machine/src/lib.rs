@@ -24,11 +24,12 @@ mod refusal;
 pub mod shipped;
 pub mod source;
 mod switch;
+pub mod workpiece;
 
 pub use drivers::DriverTiming;
 pub use file::MachineFile;
 pub use homing::{Homing, JointHoming};
 pub use load::read;
-pub use machine::{AxisLimits, Joint, Machine, PathSettings, SingularityGuard};
+pub use machine::{AxisLimits, Joint, Machine, PathSettings, SingularityGuard, SpindleSettings};
 pub use refusal::Refusal;
 pub use switch::{Switch, SwitchTarget, Switched};

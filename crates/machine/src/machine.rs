@@ -7,6 +7,7 @@ use crate::homing::{self, Homing, JointHoming};
 use crate::joint::joints;
 use crate::source::Findings;
 use crate::switch::{Switch, switches};
+use crate::workpiece::{Solid, solid};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Axis, JointKind, JointRange, Kinematics, Pose, maths};
@@ -44,6 +45,21 @@ pub struct Machine {
     pub singularity: SingularityGuard,
     /// M codes that switch the mechanism, each code once.
     pub switches: Vec<Switch>,
+    /// What the spindle can do.
+    pub spindle: SpindleSettings,
+    /// What the probe can touch, machine coordinates, mm; nothing: there is no probe.
+    pub workpiece: Vec<Solid>,
+}
+
+/// What the spindle can do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpindleSettings {
+    /// rpm
+    pub max_speed_rpm: f64,
+    /// rpm/s
+    pub acceleration_rpm_s: f64,
+    /// Longest wait for its speed and its index, s.
+    pub timeout_s: f64,
 }
 
 /// One joint: mm or rad, as the mechanism's [`JointKind`] says.
@@ -191,6 +207,8 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
         homing::check(tables, mechanism, joints, home, singularity, findings);
     }
     let switches = mechanism.as_ref().and_then(|mechanism| switches(tables, mechanism, findings));
+    let spindle = spindle(tables, findings);
+    let workpiece = workpiece(tables, findings);
     Some(Machine {
         name: name?,
         description: tables.description.clone(),
@@ -206,6 +224,8 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
         path: path?,
         singularity: singularity?,
         switches: switches?,
+        spindle: spindle?,
+        workpiece: workpiece?,
     })
 }
 
@@ -231,6 +251,37 @@ fn path(tables: &file::Tables, servo_period_ns: u64, findings: &mut Findings<'_>
         None => 0,
     };
     Some(PathSettings { blend_tolerance, smoothing_periods })
+}
+
+fn spindle(tables: &file::Tables, findings: &mut Findings<'_>) -> Option<SpindleSettings> {
+    let mut number = |key: &str, number: &Option<Number>, default: f64| match number {
+        Some(number) => positive(key, number, findings),
+        None => Some(default),
+    };
+    let file::Spindle { max_speed_rpm, acceleration_rpm_s, timeout_s } = &tables.spindle;
+    let max_speed_rpm = number("spindle.max_speed_rpm", max_speed_rpm, 6000.0);
+    let acceleration_rpm_s = number("spindle.acceleration_rpm_s", acceleration_rpm_s, 3000.0);
+    let timeout_s = number("spindle.timeout_s", timeout_s, 30.0);
+    Some(SpindleSettings {
+        max_speed_rpm: max_speed_rpm?,
+        acceleration_rpm_s: acceleration_rpm_s?,
+        timeout_s: timeout_s?,
+    })
+}
+
+fn workpiece(tables: &file::Tables, findings: &mut Findings<'_>) -> Option<Vec<Solid>> {
+    let mut solids = Vec::new();
+    for text in &tables.probe.workpiece {
+        match solid(text.get_ref()) {
+            Ok(solid) => solids.push(solid),
+            Err(why) => {
+                let message = format!("probe.workpiece {:?}: {why}", text.get_ref());
+                findings.error("machine-workpiece", text.span(), message, crate::workpiece::HELP);
+                return None;
+            }
+        }
+    }
+    Some(solids)
 }
 
 fn singularity(tables: &file::Tables, findings: &mut Findings<'_>) -> Option<SingularityGuard> {

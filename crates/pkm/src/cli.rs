@@ -127,6 +127,10 @@ pub(crate) struct ProgramArgs {
     /// and keeps the old one as FILE.bak
     #[arg(long, value_name = "FILE")]
     pub parameters: Option<PathBuf>,
+    /// What the probe can touch, machine coordinates in mm: "Z-5" (all below) or "X10..40 Y0..20 Z..8" (a box); repeatable;
+    /// in place of probe.workpiece in the machine file
+    #[arg(long, value_name = "BOX", allow_hyphen_values = true, value_parser = pkm_machine::workpiece::solid)]
+    pub probe_surface: Vec<pkm_machine::workpiece::Solid>,
     /// Skip the lines that begin with `/`
     #[arg(long)]
     pub block_delete: bool,

@@ -6,7 +6,8 @@
 use crate::limits::Feed;
 use crate::path::{Arc, FeedGroup, Geometry, Line, Spline, Tolerance, Vector, combine, feed_group};
 use crate::planner::{Move, PathMode};
-use pkm_canon::{Canon, ControlPoint, MotionControlMode, Plane, Position, Span};
+use crate::synchronised::SynchronisedMove;
+use pkm_canon::{Canon, ControlPoint, Direction, MotionControlMode, Plane, Position, Probe, Span};
 use pkm_kins::maths::radians;
 
 /// What a canonical command asks of the machine.
@@ -14,6 +15,26 @@ use pkm_kins::maths::radians;
 pub enum Event {
     /// A move.
     Move(Move),
+    /// A move in step with the spindle; with others directly before and after it a chain.
+    Synchronised(SynchronisedMove),
+    /// Into a hole and out again in step with the spindle.
+    RigidTap {
+        /// The way in.
+        step: SynchronisedMove,
+        /// Speed of the spindle on the way out over that on the way in, at least 1.
+        retract_scale: f64,
+    },
+    /// A move until the probe answers; what follows waits for it.
+    Probe(Move, Probe),
+    /// The spindle is to turn otherwise; motion does not stop for it.
+    Spindle(SpindleOrder),
+    /// The spindle is to stop at an angle; what follows waits for it.
+    Orient {
+        /// Degrees.
+        angle_deg: f64,
+        /// 0 = the shortest way, 1 clockwise, −1 counter-clockwise.
+        direction: i8,
+    },
     /// Stop and wait.
     Dwell {
         /// Nanoseconds.
@@ -25,6 +46,15 @@ pub enum Event {
     MachineCode(i32),
     /// A motion this planner cannot make: the program must not run.
     Unsupported(&'static str),
+}
+
+/// How the spindle is to turn (M3, M4, M5, S).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SpindleOrder {
+    /// At all.
+    pub on: bool,
+    /// rpm; negative = counter-clockwise.
+    pub speed_rpm: f64,
 }
 
 /// The state between program and machine coordinates.
@@ -40,7 +70,14 @@ pub struct Frame {
     /// Program units per minute, or per turn.
     feed_rate: f64,
     per_turn: bool,
-    spindle_rpm: f64,
+    spindle: SpindleOrder,
+    /// S, and the direction of M3 or M4, of spindle 0.
+    spindle_speed: f64,
+    spindle_turns: Option<Direction>,
+    /// G96: S is a surface speed.
+    surface_speed: bool,
+    /// Between START_ and STOP_SPEED_FEED_SYNCH: travel per turn, program units; or why that cannot be.
+    in_step: Option<Result<f64, &'static str>>,
     mode: PathMode,
     /// G64 Q, mm.
     merge_mm: f64,
@@ -62,7 +99,11 @@ impl Frame {
             rotation: (1.0, 0.0),
             feed_rate: 0.0,
             per_turn: false,
-            spindle_rpm: 0.0,
+            spindle: SpindleOrder::default(),
+            spindle_speed: 0.0,
+            spindle_turns: None,
+            surface_speed: false,
+            in_step: None,
             mode: PathMode::Blend(default_tolerance),
             merge_mm: 0.0,
             default_tolerance,
@@ -89,16 +130,38 @@ impl Frame {
     pub fn apply(&mut self, command: &Canon<'_>, span: Span, mut emit: impl FnMut(Event)) {
         match *command {
             Canon::StraightTraverse(to) => self.line(to, true, span, emit),
-            Canon::StraightFeed(to) => self.line(to, false, span, emit),
+            Canon::StraightFeed(to) => match self.in_step {
+                Some(Ok(per_turn)) => {
+                    self.in_step(to, per_turn, span, |step| emit(Event::Synchronised(step)))
+                }
+                Some(Err(why)) => emit(Event::Unsupported(why)),
+                None => self.line(to, false, span, emit),
+            },
             Canon::ArcFeed { end, first_centre, second_centre, turns } => {
                 self.arc(end, [first_centre, second_centre], turns, span, emit);
             }
             Canon::NurbsFeed { points, order } => self.spline(points, order, span, emit),
-            Canon::StraightProbe { .. } => emit(Event::Unsupported("probing (G38.2 to G38.5)")),
-            Canon::RigidTap { .. } => emit(Event::Unsupported("rigid tapping (G33.1)")),
-            Canon::StartSpeedFeedSync { .. } => {
-                emit(Event::Unsupported("motion in step with the spindle (G33, G76)"));
+            Canon::StraightProbe { end, probe } => self.line(end, false, span, |event| {
+                emit(if let Event::Move(step) = event { Event::Probe(step, probe) } else { event });
+            }),
+            Canon::RigidTap { end, retract_scale } => match self.in_step {
+                Some(Ok(per_turn)) => {
+                    let start = self.position;
+                    self.in_step(end, per_turn, span, |step| emit(Event::RigidTap { step, retract_scale }));
+                    self.position = start;
+                }
+                Some(Err(why)) => emit(Event::Unsupported(why)),
+                None => emit(Event::Unsupported("a rigid tap without a pitch")),
+            },
+            Canon::StartSpeedFeedSync { spindle, feed_per_turn, velocity_mode } => {
+                self.in_step = Some(match (spindle, velocity_mode, self.surface_speed) {
+                    (0, 0, false) => Ok(feed_per_turn),
+                    (0, 0, true) => Err("motion in step with a spindle at constant surface speed (G96)"),
+                    (0, ..) => Err("motion at a feed per turn of the spindle's actual speed"),
+                    _ => Err("motion in step with another spindle than the first ($)"),
+                });
             }
+            Canon::StopSpeedFeedSync => self.in_step = None,
             Canon::Dwell(seconds) => {
                 let ns = seconds.clamp(0.0, 1e9) * 1e9;
                 emit(Event::Dwell { ns: pkm_kins::maths::round(ns) as u64 });
@@ -107,7 +170,29 @@ impl Frame {
             Canon::MachineCode(number) => emit(Event::MachineCode(number)),
             Canon::SetFeedRate(rate) => self.feed_rate = rate,
             Canon::SetFeedMode { mode, .. } => self.per_turn = mode == 1,
-            Canon::SetSpindleSpeed { speed, .. } => self.spindle_rpm = speed.abs(),
+            Canon::SetSpindleSpeed { spindle: 0, speed } => {
+                self.spindle_speed = speed;
+                self.order_spindle(emit);
+            }
+            Canon::SetSpindleMode { spindle: 0, css_limit } => self.surface_speed = css_limit != 0.0,
+            Canon::StartSpindle { spindle: 0, direction } => {
+                self.spindle_turns = Some(direction);
+                self.order_spindle(emit);
+            }
+            Canon::StopSpindle { spindle: 0 } => {
+                self.spindle_turns = None;
+                self.order_spindle(emit);
+            }
+            Canon::OrientSpindle { spindle: 0, angle, mode } => {
+                self.spindle_turns = None;
+                self.order_spindle(&mut emit);
+                let direction = match mode {
+                    1 => 1,
+                    0 => 0,
+                    _ => -1,
+                };
+                emit(Event::Orient { angle_deg: angle, direction });
+            }
             Canon::UseLengthUnits(unit) => self.unit_mm = unit.mm(),
             Canon::SelectPlane(plane) => self.plane = plane,
             Canon::SetG5xOffset { offset, .. } => self.g5x = self.scaled(offset),
@@ -126,7 +211,7 @@ impl Frame {
                     _ => PathMode::Blend(p),
                 };
             }
-            // Spindle, coolant, tool, messages: nothing moves, and nothing stops for them.
+            // Other spindles, coolant, tool, messages: nothing moves, and nothing stops for them.
             _ => {}
         }
     }
@@ -154,7 +239,7 @@ impl Frame {
     }
 
     fn feed(&self, group: FeedGroup) -> Feed {
-        let per_second = if self.per_turn { self.spindle_rpm / 60.0 } else { 1.0 / 60.0 };
+        let per_second = if self.per_turn { self.spindle_speed.abs() / 60.0 } else { 1.0 / 60.0 };
         let unit = match group {
             FeedGroup::Abc => radians(1.0),
             _ => self.unit_mm,
@@ -170,6 +255,33 @@ impl Frame {
         let group = feed_group(&combine(&end, &start, |b, a| b - a));
         let feed = if rapid { Feed { speed: f64::INFINITY, group } } else { self.feed(group) };
         emit(Event::Move(Move { geometry: Geometry::Line(line), feed, rapid, mode: self.mode, span }));
+    }
+
+    /// A move in step with the spindle.
+    fn in_step(&mut self, to: Position, per_turn: f64, span: Span, mut emit: impl FnMut(SynchronisedMove)) {
+        let mode = self.mode;
+        let turns_s = self.spindle.speed_rpm.abs() / 60.0;
+        let unit_mm = self.unit_mm;
+        self.line(to, false, span, |event| {
+            let Event::Move(Move { geometry, feed, .. }) = event else { return };
+            let unit = if feed.group == FeedGroup::Abc { radians(1.0) } else { unit_mm };
+            let per_turn = per_turn * unit;
+            emit(SynchronisedMove { geometry, per_turn, mode, turns_s, motion: 0, span });
+        });
+    }
+
+    /// Tells of the spindle if it is to turn otherwise. At constant surface speed (G96) it keeps the speed it has.
+    fn order_spindle(&mut self, mut emit: impl FnMut(Event)) {
+        let rpm = if self.surface_speed { self.spindle.speed_rpm.abs() } else { self.spindle_speed };
+        let order = match self.spindle_turns {
+            Some(Direction::Clockwise) => SpindleOrder { on: true, speed_rpm: rpm },
+            Some(Direction::Counterclockwise) => SpindleOrder { on: true, speed_rpm: -rpm },
+            None => SpindleOrder::default(),
+        };
+        if order != self.spindle {
+            self.spindle = order;
+            emit(Event::Spindle(order));
+        }
     }
 
     /// The machine's XYZ indices of the plane's first and second axis and of its normal.

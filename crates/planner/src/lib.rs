@@ -24,13 +24,15 @@ mod operator;
 pub mod path;
 mod planner;
 mod switch;
+mod synchronised;
 mod walk;
 
-pub use frame::{Event, Frame};
+pub use frame::{Event, Frame, SpindleOrder};
 pub use jerk::Smoother;
 pub use limits::{AxisLimits, Feed, GUARD, JointLimits, Limits, LimitsError};
 pub use merge::{Chords, MOST_MERGED, Merger};
 pub use planner::{Move, PathMode, Planner, PushError, Setpoint, Settings, State, Work};
+pub use synchronised::{RESERVE, SpindleReading, Stage, Synchronised, SynchronisedMove, Tap};
 
 use pkm_canon::Span;
 use pkm_kins::{Axis, InverseError, JointRange, Pose};
@@ -54,6 +56,8 @@ pub enum PlanErrorKind {
     Unreachable(InverseError),
     /// A feed that is not above 0: the move would never end.
     NoFeed,
+    /// A move in step with the spindle whose travel per turn is not above 0.
+    NoPitch,
     /// A joint outside its travel.
     JointTravel {
         /// From 0.

@@ -3,9 +3,13 @@
 //! Nothing is planned here: every programmed move is sampled closely along its whole length. All findings are
 //! reported (one a block and kind), not only the first.
 
-use crate::feeder::{Events, HostLimits, face, frame, inside, interpreter, limits, settings, skip_to_line};
+use crate::feeder::{
+    Events, HostLimits, face, frame, inside, interpreter, limits, settings, skip_to_line, tell_probe,
+};
+use crate::probing::contact;
 use crate::program::Program;
 use crate::switch::switched;
+use crate::synchronised::judge;
 use crate::{Options, messages};
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_canon::{FileId, Span};
@@ -13,8 +17,8 @@ use pkm_gcode::{Settings, Status};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{JointRange, Kinematics, Pose};
 use pkm_machine::Machine;
-use pkm_planner::path::Geometry;
-use pkm_planner::{Event, Frame, Move, PlanError, PlanErrorKind};
+use pkm_planner::path::{FeedGroup, Geometry};
+use pkm_planner::{Event, Feed, Frame, Move, PlanError, PlanErrorKind, SynchronisedMove};
 use std::collections::{BTreeSet, VecDeque};
 use std::ops::ControlFlow;
 
@@ -35,6 +39,10 @@ pub struct Checked {
     pub moves: u64,
     /// What was found where: a loop or a sub that runs often says it once.
     known: BTreeSet<(String, u32, u32, String)>,
+    /// The first block that probes.
+    pub probes: Option<Span>,
+    /// The spindle is used.
+    pub turns: bool,
 }
 
 impl Checked {
@@ -159,6 +167,8 @@ fn interpret(
     let mut interpreter = interpreter(machine, options, &start);
     let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
     let mut frame = frame(machine, &start);
+    let workpiece = options.workpiece(machine);
+    let mut probed = None;
     let mut queue = VecDeque::new();
     let mut sink = Events { frame: &mut frame, queue: &mut queue };
     if let Err(finding) = skip_to_line(&mut interpreter, program, &mut *source, options, &start, &mut sink) {
@@ -208,6 +218,31 @@ fn interpret(
                         refused,
                     });
                 }
+                Event::Synchronised(step) => {
+                    checked.moves += 1;
+                    checked.turns = true;
+                    check_in_step(program, machine, &limits, &mechanism, (&step, None), &mut findings);
+                }
+                Event::RigidTap { step, retract_scale } => {
+                    checked.moves += 1;
+                    checked.turns = true;
+                    let tap = (&step, Some(retract_scale));
+                    check_in_step(program, machine, &limits, &mechanism, tap, &mut findings);
+                }
+                Event::Probe(step, probe) => {
+                    if checked.probes.is_none() {
+                        checked.probes = Some(span);
+                        findings.push(messages::probe_assumed(program, span, !workpiece.is_empty()));
+                    }
+                    checked.moves += 1;
+                    check_move(program, machine, &mechanism, &limits, (&step, span), &mut findings);
+                    let met = contact(workpiece, &step.geometry, probe.away);
+                    let place = step.geometry.at(met.unwrap_or(step.geometry.length())).position;
+                    // Nothing known: as if it met something at the end.
+                    probed = Some((place, met.is_some() || workpiece.is_empty()));
+                    frame.set_position(place);
+                }
+                Event::Spindle(_) | Event::Orient { .. } => checked.turns = true,
                 Event::Unsupported(what) => findings.push(messages::unsupported(program, span, what)),
                 Event::MachineCode(number) => {
                     let code = (number, span);
@@ -233,10 +268,36 @@ fn interpret(
         }
         match stepped {
             Ok(Status::Ended) => return Ok(checked),
-            Ok(Status::Synch) => interpreter.set_machine_position_mm(face(frame.position())),
+            Ok(Status::Synch) => {
+                if let Some((place, tripped)) = probed.take() {
+                    tell_probe(&mut interpreter, &Pose::from_array(place), tripped);
+                }
+                interpreter.set_machine_position_mm(face(frame.position()));
+            }
             Err(_) if switches => interpreter.set_machine_position_mm(face(frame.position())),
             Ok(Status::Running) | Err(_) => {}
         }
+    }
+}
+
+/// A move in step with the spindle; a tap has a retract scale.
+fn check_in_step(
+    program: &Program,
+    machine: &Machine,
+    limits: &HostLimits,
+    mechanism: &Mechanism,
+    (step, retract_scale): (&SynchronisedMove, Option<f64>),
+    findings: &mut Vec<Diagnostic>,
+) {
+    let feed = Feed { speed: f64::INFINITY, group: FeedGroup::Xyz };
+    let SynchronisedMove { geometry, mode, span, .. } = *step;
+    let along = Move { geometry, feed, rapid: true, mode, span };
+    check_move(program, machine, mechanism, limits, (&along, span), findings);
+    // What cannot be reached is told; how fast that would be says nothing.
+    if findings.iter().all(|finding| finding.severity != Severity::Error)
+        && let Err(finding) = judge(program, machine, limits, mechanism, step, retract_scale)
+    {
+        findings.push(finding);
     }
 }
 

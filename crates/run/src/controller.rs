@@ -1,11 +1,12 @@
 //! The motion controller with its machine: homing, then the program; what stops it, and how.
 
 use crate::feeder::{Feeder, FeederError};
+use crate::probing::spindle_config;
 use crate::program::Program;
 use crate::wiring::{self, Wiring};
 use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
-use pkm_hal_sim::{Homing, Observer, Simulation, TickError};
+use pkm_hal_sim::{Homing, Observer, Simulation, SimulationConfig, TickError};
 use pkm_machine::Machine;
 
 /// Periods in which a machine that stops must have come to rest, and those after which it has.
@@ -22,20 +23,24 @@ pub(crate) struct Controller<'a> {
 }
 
 impl<'a> Controller<'a> {
-    /// `switches`: the machine has switches even if nothing asks for them.
+    /// `switches`: the machine has switches even if nothing asks for them; `spindle`: the program needs one.
     pub(crate) fn new(
         program: &'a Program,
         machine: &'a Machine,
         options: &Options,
-        switches: bool,
+        (switches, spindle): (bool, bool),
     ) -> Result<Self, Diagnostic> {
         let substeps = u64::from(options.substeps.max(1));
         let feeder = Feeder::new(program, machine, options)?;
         let switches = switches || options.home || !options.faults.is_empty();
         let wiring = Wiring { substeps, switches, homed: !options.home, seed: 1 };
         let stands = options.start.unwrap_or(machine.home);
-        let mut simulation = Simulation::new(&wiring::config(machine, stands, wiring))
-            .map_err(|e| messages::host(program, &e.to_string()))?;
+        let config = SimulationConfig {
+            spindle: spindle.then(|| spindle_config(machine)),
+            workpiece: options.workpiece(machine).to_vec(),
+            ..wiring::config(machine, stands, wiring)
+        };
+        let mut simulation = Simulation::new(&config).map_err(|e| messages::host(program, &e.to_string()))?;
         for fault in options.faults {
             simulation.hal_mut().inject(fault).map_err(|e| messages::no_such_pin(program, fault, &e))?;
         }

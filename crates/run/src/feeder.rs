@@ -3,19 +3,22 @@
 //! The interpreter is read only as far ahead as the planner has room, so memory does not grow with the program.
 
 use crate::deviation::Programmed;
+use crate::probing::Probing;
 use crate::program::Program;
 use crate::switch::{FormSwitchDrive, switched};
+use crate::synchronised::{MOST_MOVES, SynchronisedDrive};
 use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
-use pkm_canon::{Canon, CanonSink, Span};
+use pkm_canon::{Canon, CanonSink, Probe, Span};
 use pkm_gcode::{Interpreter, LineSource, MachineCodes, Parameters, Settings, Status};
-use pkm_hal_sim::{Feedback, Operator, Setpoint, SetpointSource};
+use pkm_hal_sim::{Feedback, Operator, Orient, Setpoint, SetpointSource, SpindleCommand, SpindleFeedback};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Joints, Kinematics, Pose, maths};
 use pkm_machine::{Machine, Switched};
-use pkm_planner::path::{Tolerance, Vector, feed_length};
+use pkm_planner::path::{FeedGroup, Geometry, Tolerance, Vector, feed_length};
 use pkm_planner::{
-    AxisLimits, Chords, Event, Frame, JointLimits, Limits, Merger, Move, Planner, PushError, Smoother, State,
+    AxisLimits, Chords, Event, Feed, Frame, JointLimits, Limits, Merger, Move, PathMode, Planner, PushError,
+    Smoother, SpindleOrder, State, SynchronisedMove,
 };
 use std::collections::VecDeque;
 use std::fmt;
@@ -148,6 +151,13 @@ impl CanonSink for Events<'_> {
     }
 }
 
+/// Tells the interpreter where the probe answered: machine coordinates, mm and rad.
+pub(crate) fn tell_probe(interpreter: &mut Interpreter, at: &Pose, tripped: bool) {
+    interpreter.set_machine_position_mm(face(&at.to_array()));
+    let point = interpreter.position();
+    interpreter.set_probe_result(point, tripped);
+}
+
 /// Why there is no setpoint.
 #[derive(Debug)]
 pub(crate) struct FeederError(pub(crate) Box<Diagnostic>);
@@ -156,6 +166,26 @@ impl fmt::Display for FeederError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0.message)
     }
+}
+
+/// What can only begin at rest.
+#[derive(Debug)]
+enum Pending {
+    /// A code of the machine's own.
+    Code(i32, Span),
+    /// A chain, with the retract scale of a tap.
+    Chain(Vec<SynchronisedMove>, Option<f64>),
+    Probe(Move, Probe, Span),
+    Orient(Orient, Span),
+}
+
+/// What the chains in step with the spindle were.
+#[derive(Debug, Default)]
+pub(crate) struct Chains {
+    pub(crate) threads: u64,
+    pub(crate) taps: u64,
+    /// Those in which the tool never caught up.
+    pub(crate) warnings: Vec<Diagnostic>,
 }
 
 /// The controller of one run.
@@ -168,9 +198,28 @@ pub(crate) struct Feeder<'a> {
     planner: Box<HostPlanner>,
     /// The mechanism in force: of the machine file until a program switches.
     mechanism: Mechanism,
-    /// A code of the machine's own that waits for everything before it to be driven.
-    code: Option<(i32, Span)>,
+    limits: HostLimits,
+    /// What waits for everything before it to be driven.
+    pending: Option<Pending>,
     form_switch: Option<FormSwitchDrive>,
+    /// Moves in step with the spindle that so far belong to one chain, and the chain under way.
+    chain: Vec<SynchronisedMove>,
+    in_step: Option<SynchronisedDrive>,
+    pub(crate) chains: Chains,
+    probing: Option<Probing>,
+    /// Whether there is anything to probe.
+    has_probe: bool,
+    /// What the machine told last; `fresh` until the next setpoint.
+    feedback: Feedback,
+    fresh: bool,
+    /// What the spindle does, and what it will be told when that move (counted from 0) begins.
+    spindle: SpindleOrder,
+    orders: VecDeque<(u32, SpindleOrder)>,
+    /// Moves pushed so far.
+    moves: u32,
+    /// Where the spindle stands after M19, and the M19 under way with the periods it has waited.
+    orient: Option<Orient>,
+    orienting: Option<(Span, u64)>,
     /// The interpreter waits to be told where the machine stands.
     synch: bool,
     substeps: u32,
@@ -190,6 +239,8 @@ pub(crate) struct Feeder<'a> {
     feed_override: f64,
     /// The planner runs twice in this period.
     doubled: bool,
+    /// Feed hold.
+    held: bool,
     aborted: bool,
     failure: Option<Diagnostic>,
     pub(crate) programmed: Programmed,
@@ -211,7 +262,7 @@ impl<'a> Feeder<'a> {
             settle_periods: machine.path.smoothing_periods,
         };
         let mut planner = Box::new(
-            HostPlanner::new(machine.mechanism, limits, settings, start)
+            HostPlanner::new(machine.mechanism, limits.clone(), settings, start)
                 .map_err(|e| messages::plan(program, machine, &e))?,
         );
         planner.set_feed_override(options.feed_override);
@@ -223,6 +274,8 @@ impl<'a> Feeder<'a> {
         let (mut frame, mut queue) = (frame(machine, &start), VecDeque::new());
         let mut sink = Events { frame: &mut frame, queue: &mut queue };
         skip_to_line(&mut interpreter, program, &mut *source, options, &start, &mut sink)?;
+        // Nothing of what was skipped moves the machine; the spindle turns as it then would.
+        queue.retain(|(event, _)| matches!(event, Event::Spindle(_)));
         Ok(Self {
             program,
             machine,
@@ -231,8 +284,21 @@ impl<'a> Feeder<'a> {
             frame,
             planner,
             mechanism: machine.mechanism,
-            code: None,
+            limits,
+            pending: None,
             form_switch: None,
+            chain: Vec::new(),
+            in_step: None,
+            chains: Chains::default(),
+            probing: None,
+            has_probe: !options.workpiece(machine).is_empty(),
+            feedback: Feedback::default(),
+            fresh: false,
+            spindle: SpindleOrder::default(),
+            orders: VecDeque::new(),
+            moves: 0,
+            orient: None,
+            orienting: None,
             synch: false,
             substeps: settings.substeps,
             given: 0,
@@ -246,6 +312,7 @@ impl<'a> Feeder<'a> {
             program_ended: false,
             feed_override: options.feed_override,
             doubled: false,
+            held: false,
             aborted: false,
             failure: None,
             programmed: Programmed::default(),
@@ -257,11 +324,27 @@ impl<'a> Feeder<'a> {
     /// Everything driven and at rest.
     pub(crate) fn is_done(&mut self) -> bool {
         self.fill();
-        let waits = self.code.is_some() || self.form_switch.is_some();
+        let waits = self.pending.is_some() || !self.chain.is_empty() || self.is_elsewhere();
         // What lies behind a place that cannot be planned is never driven.
         let driven = self.planner.is_idle() || self.failure.is_some() && self.planner.at_rest();
         let taken = self.queue.is_empty() && self.merged.is_empty();
         self.program_ended && taken && !waits && driven
+    }
+
+    /// Something else than the planner moves the machine, or it is waited for.
+    fn is_elsewhere(&self) -> bool {
+        let moves = self.form_switch.is_some() || self.in_step.is_some();
+        moves || self.probing.is_some() || self.orienting.is_some()
+    }
+
+    /// True while a chain waits for the spindle or follows it.
+    pub(crate) fn is_in_step(&self) -> bool {
+        self.in_step.is_some()
+    }
+
+    /// How far the tool is from where the spindle's turns (now, at the end of the period) say it should be, while it is in step.
+    pub(crate) fn synchronisation_error_mm(&self, spindle: &SpindleFeedback) -> Option<f64> {
+        self.in_step.as_ref().and_then(|drive| drive.error_mm(spindle))
     }
 
     /// The mechanism in force.
@@ -285,7 +368,9 @@ impl<'a> Feeder<'a> {
 
     /// Line being executed.
     pub(crate) fn line(&self) -> u32 {
-        self.form_switch.as_ref().map_or(self.planner.setpoint().span, |switch| switch.span).line
+        let elsewhere = self.form_switch.as_ref().map(|switch| switch.span);
+        let elsewhere = elsewhere.or(self.in_step.as_ref().map(|drive| drive.span));
+        elsewhere.unwrap_or(self.planner.setpoint().span).line
     }
 
     /// The setpoint given last.
@@ -301,13 +386,19 @@ impl<'a> Feeder<'a> {
         {
             self.fail(messages::plan(self.program, self.machine, &fault));
         }
-        while self.planner.has_room() && self.form_switch.is_none() {
-            if let Some(code) = self.code {
+        self.conclude_probing();
+        while self.planner.has_room() && !self.is_elsewhere() {
+            if self.pending.is_some() {
                 if !self.planner.is_idle() || !self.given.is_multiple_of(self.substeps.into()) {
                     return;
                 }
-                self.code = None;
-                if let Err(failure) = self.switch(code) {
+                // What the probe tells before the first period says nothing.
+                if matches!(self.pending, Some(Pending::Probe(..))) && (!self.fresh || self.given == 0) {
+                    return;
+                }
+                if let Some(pending) = self.pending.take()
+                    && let Err(failure) = self.begin(pending)
+                {
                     self.fail(failure);
                 }
             } else if let Some((step, chords)) = self.merged.pop_front() {
@@ -322,7 +413,10 @@ impl<'a> Feeder<'a> {
                 self.flush_merger();
                 if self.merged.is_empty() {
                     self.planner.finish();
-                    return;
+                    if self.chain.is_empty() {
+                        return;
+                    }
+                    self.close_chain();
                 }
             } else if self.synch {
                 self.synch = false;
@@ -338,8 +432,12 @@ impl<'a> Feeder<'a> {
         self.doubled = operator.doubled;
         self.planner.hold(operator.feed_hold);
         self.planner.set_feed_override(self.feed_override * operator.adaptive_feed);
+        self.held = operator.feed_hold;
         if operator.abort && !self.aborted {
             self.aborted = true;
+            if let Some(drive) = &mut self.in_step {
+                drive.abort();
+            }
             self.fail(messages::aborted(self.program, self.line()));
             self.planner.abort();
         }
@@ -366,7 +464,155 @@ impl<'a> Feeder<'a> {
         self.queue.clear();
         self.merger = Merger::default();
         self.merged.clear();
-        self.code = None;
+        self.chain.clear();
+        self.pending = None;
+        self.orienting = None;
+    }
+
+    /// The machine rests and nothing is waiting: what needs that begins.
+    fn begin(&mut self, pending: Pending) -> Result<(), Diagnostic> {
+        match pending {
+            Pending::Code(code, span) => self.switch((code, span)),
+            Pending::Orient(orient, span) => {
+                self.orient = Some(orient);
+                self.orienting = Some((span, 0));
+                Ok(())
+            }
+            Pending::Chain(moves, retract_scale) => self.begin_chain(moves, retract_scale),
+            Pending::Probe(step, probe, span) => {
+                if !self.has_probe {
+                    return Err(messages::probe_not_wired(self.program, span));
+                }
+                if self.feedback.probe != probe.away {
+                    return Err(messages::probe_at_start(self.program, span, probe.away));
+                }
+                self.push(step, &Chords::default())?;
+                self.planner.finish();
+                self.probing = Some(Probing { probe, span, tripped: None });
+                Ok(())
+            }
+        }
+    }
+
+    /// What follows does not belong to the chain.
+    fn close_chain(&mut self) {
+        self.planner.finish();
+        self.pending = Some(Pending::Chain(std::mem::take(&mut self.chain), None));
+    }
+
+    fn begin_chain(
+        &mut self,
+        mut moves: Vec<SynchronisedMove>,
+        retract_scale: Option<f64>,
+    ) -> Result<(), Diagnostic> {
+        if let Some((_, last)) = self.orders.drain(..).next_back() {
+            self.spindle = last;
+        }
+        for step in &mut moves {
+            // A move of no length is only counted by the planner; its number is the chain's.
+            let still = Move {
+                geometry: Geometry::Hold(step.geometry.at(0.0).position),
+                feed: Feed { speed: f64::INFINITY, group: FeedGroup::Xyz },
+                rapid: true,
+                mode: PathMode::ExactStop,
+                span: step.span,
+            };
+            step.motion = self.planner.push(still).map_err(|error| self.refused(&error))?;
+            self.moves = step.motion.wrapping_add(1);
+            self.path_length_mm += step.geometry.length();
+            self.programmed.push(step.motion, step.geometry, &[]);
+        }
+        self.in_step = Some(SynchronisedDrive::new(
+            self.program,
+            self.machine,
+            &self.limits,
+            &self.mechanism,
+            &moves,
+            retract_scale,
+            (self.spindle, self.substeps),
+        )?);
+        Ok(())
+    }
+
+    /// A chain is over: the planner goes on from its end.
+    fn end_chain(&mut self) -> Result<(), Diagnostic> {
+        let Some(drive) = self.in_step.take_if(|drive| drive.is_over()) else { return Ok(()) };
+        *if drive.is_tap() { &mut self.chains.taps } else { &mut self.chains.threads } += 1;
+        if drive.was_never_in_step() {
+            self.chains.warnings.push(messages::never_in_step(self.program, drive.span));
+        }
+        let (mechanism, pose) = (self.mechanism, self.setpoint.pose);
+        self.planner.switch(mechanism, pose, drive.span).map_err(|error| self.refused(&error))
+    }
+
+    /// The probe has met something: braking begins. The place is that of the period at whose end it answered.
+    fn watch_probe(&mut self) {
+        let Some(probing) = &mut self.probing else { return };
+        if probing.tripped.is_none() && self.fresh && self.feedback.probe != probing.probe.away {
+            probing.tripped = Some(self.setpoint.pose);
+            self.planner.abort();
+        }
+    }
+
+    /// A probing move has come to rest: the interpreter is told.
+    fn conclude_probing(&mut self) {
+        self.watch_probe();
+        if !self.fresh || !self.planner.is_idle() || !self.given.is_multiple_of(self.substeps.into()) {
+            return;
+        }
+        let Some(Probing { probe, span, tripped }) = self.probing.take() else { return };
+        let rests = self.planner.setpoint().pose;
+        if tripped.is_none() && probe.must_trip {
+            let failure = messages::probe_no_contact(self.program, self.machine, span, probe.away, &rests);
+            self.fail(failure);
+            return;
+        }
+        tell_probe(&mut self.interpreter, &tripped.unwrap_or(rests), tripped.is_some());
+        self.frame.set_position(rests.to_array());
+    }
+
+    /// The spindle is told what comes with the move that has begun.
+    fn order_spindle(&mut self) {
+        let now = self.planner.setpoint();
+        let begun = if now.state == State::Dwell { now.motion.wrapping_add(1) } else { now.motion };
+        let idle = self.planner.is_idle();
+        while let Some(&(motion, order)) = self.orders.front()
+            && (idle || motion <= begun)
+        {
+            self.spindle = order;
+            self.orders.pop_front();
+        }
+        if self.spindle.on {
+            self.orient = None;
+        }
+    }
+
+    /// M19: waits for the angle.
+    fn wait_for_angle(&mut self) -> Result<(), Diagnostic> {
+        let Some((span, waited)) = &mut self.orienting else { return Ok(()) };
+        if *waited > u64::from(self.substeps) && self.feedback.spindle.is_oriented {
+            self.orienting = None;
+            return Ok(());
+        }
+        *waited += 1;
+        let timeout_s = self.machine.spindle.timeout_s;
+        let most = timeout_s * 1e9 / self.machine.servo_period_ns as f64 * f64::from(self.substeps);
+        if *waited as f64 > most {
+            return Err(messages::orient_timeout(self.program, *span, timeout_s));
+        }
+        Ok(())
+    }
+
+    fn spindle_command(&self) -> SpindleCommand {
+        match &self.in_step {
+            Some(drive) => drive.command(),
+            None => SpindleCommand {
+                on: self.spindle.on,
+                speed_rpm: self.spindle.speed_rpm,
+                orient: self.orient,
+                index_enable: false,
+            },
+        }
     }
 
     /// At rest, at the beginning of a servo period: does what a code of the machine's own asks for.
@@ -400,6 +646,10 @@ impl<'a> Feeder<'a> {
         let planned =
             self.planner.tick().map_err(|error| messages::plan(self.program, self.machine, &error))?;
         self.given += 1;
+        if let Some(drive) = &mut self.in_step {
+            let spindle = &self.feedback.spindle;
+            return drive.next(self.program, self.machine, &self.mechanism, spindle, &self.setpoint);
+        }
         let Some(drive) = &mut self.form_switch else { return Ok(planned) };
         Ok(drive.next(&self.mechanism, &planned))
     }
@@ -418,6 +668,11 @@ impl<'a> Feeder<'a> {
     }
 
     fn take(&mut self, event: Event, span: Span) -> Result<(), Diagnostic> {
+        if !self.chain.is_empty() && !matches!(event, Event::Synchronised(_)) {
+            self.queue.push_front((event, span));
+            self.close_chain();
+            return Ok(());
+        }
         if let Event::Move(step) = event {
             let within_mm = self.frame.merge_tolerance_mm();
             self.merger.push(step, within_mm, |step, chords| self.merged.push_back((step, chords.clone())));
@@ -432,7 +687,36 @@ impl<'a> Feeder<'a> {
             Event::Unsupported(what) => Err(messages::unsupported(self.program, span, what)),
             Event::MachineCode(number) => {
                 self.planner.finish();
-                self.code = Some((number, span));
+                self.pending = Some(Pending::Code(number, span));
+                Ok(())
+            }
+            Event::Synchronised(_) if self.chain.len() >= MOST_MOVES => {
+                Err(messages::chain_too_long(self.program, span, MOST_MOVES))
+            }
+            Event::Synchronised(step) => {
+                self.chain.push(step);
+                Ok(())
+            }
+            Event::RigidTap { step, retract_scale } => {
+                self.planner.finish();
+                self.pending = Some(Pending::Chain(vec![step], Some(retract_scale)));
+                Ok(())
+            }
+            Event::Probe(step, probe) => {
+                self.planner.finish();
+                self.pending = Some(Pending::Probe(step, probe, span));
+                Ok(())
+            }
+            Event::Orient { angle_deg, direction } => {
+                self.planner.finish();
+                self.pending = Some(Pending::Orient(Orient { angle_deg, direction }, span));
+                Ok(())
+            }
+            Event::Spindle(order) => {
+                match self.orders.back_mut() {
+                    Some((motion, last)) if *motion == self.moves => *last = order,
+                    _ => self.orders.push_back((self.moves, order)),
+                }
                 Ok(())
             }
             Event::Stop => {
@@ -447,6 +731,7 @@ impl<'a> Feeder<'a> {
 
     fn push(&mut self, step: Move, chords: &Chords) -> Result<(), Diagnostic> {
         let motion = self.planner.push(step).map_err(|error| self.refused(&error))?;
+        self.moves = motion.wrapping_add(1);
         let length = step.geometry.length();
         self.path_length_mm += length * feed_length(&step.geometry.at(0.0).first, step.feed.group);
         if length > 0.0 {
@@ -469,15 +754,22 @@ impl SetpointSource for Feeder<'_> {
 
     fn feedback(&mut self, feedback: &Feedback) {
         self.operator(&feedback.operator);
+        self.feedback = *feedback;
+        self.fresh = true;
     }
 
     fn next(&mut self, _tick: u64) -> Result<Setpoint, FeederError> {
-        if self.doubled {
+        let told = |failure| FeederError(Box::new(failure));
+        // In step with the spindle the place follows its turns, not the number of periods.
+        if self.doubled && self.in_step.is_none() {
             self.fill();
-            self.planned().map_err(|failure| FeederError(Box::new(failure)))?;
+            self.planned().map_err(told)?;
         }
         self.fill();
-        let mut setpoint = self.planned().map_err(|failure| FeederError(Box::new(failure)))?;
+        self.wait_for_angle().map_err(told)?;
+        self.order_spindle();
+        let mut setpoint = self.planned().map_err(told)?;
+        self.fresh = false;
         if let Some(fault) = self.planner.fault().copied() {
             let failure = messages::plan(self.program, self.machine, &fault);
             self.fail(failure);
@@ -491,13 +783,20 @@ impl SetpointSource for Feeder<'_> {
                 n if n > self.delay => self.late.pop_front().unwrap_or(setpoint),
                 _ => self.late.front().copied().unwrap_or(setpoint),
             };
-            setpoint =
-                pkm_planner::Setpoint { joints, joint_velocity, pose, state: setpoint.state, ..middle };
+            // In step with the spindle there is no time for an average; it follows, and has arrived before the next move.
+            if self.in_step.is_none() {
+                let state = setpoint.state;
+                setpoint = pkm_planner::Setpoint { joints, joint_velocity, pose, state, ..middle };
+            }
         }
         self.setpoint = setpoint;
         if let Some(drive) = self.form_switch.take_if(|drive| drive.is_over())
             && let Err(failure) = self.arrive(&drive.after, drive.span)
         {
+            self.fail(failure);
+        }
+        let spindle = self.spindle_command();
+        if let Err(failure) = self.end_chain() {
             self.fail(failure);
         }
         Ok(Setpoint {
@@ -506,7 +805,7 @@ impl SetpointSource for Feeder<'_> {
             velocities: setpoint.joint_velocity,
             line: setpoint.span.line,
             in_position: setpoint.state == State::Idle,
-            spindle: Default::default(),
+            spindle,
         })
     }
 }

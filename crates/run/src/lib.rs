@@ -13,10 +13,12 @@ mod language;
 mod limited;
 mod messages;
 mod plan;
+mod probing;
 mod program;
 mod rehearsal;
 mod summary;
 mod switch;
+mod synchronised;
 mod wiring;
 
 pub use check::{Checked, Programmed, check, check_with};
@@ -27,7 +29,7 @@ pub use pkm_analysis::outcome::{Objection, Outcome};
 pub use plan::{BlockPlan, Plan, Shares, plan};
 pub use program::Program;
 pub use rehearsal::{Played, Rehearsal};
-pub use summary::{ClosestApproach, JointSummary, SCHEMA, Summary};
+pub use summary::{ClosestApproach, JointSummary, SCHEMA, Summary, Synchronisation};
 
 use controller::Controller;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
@@ -36,6 +38,7 @@ use pkm_hal_sim::components::kinematics::Forward;
 use pkm_hal_sim::{Observer, PinFault, Simulation};
 use pkm_kins::Pose;
 use pkm_machine::Machine;
+use pkm_machine::workpiece::Solid;
 use std::ops::ControlFlow;
 use summary::Account;
 
@@ -64,6 +67,15 @@ pub struct Options {
     pub faults: &'static [PinFault],
     /// What the parameters are when the program begins; a fresh set without it.
     pub parameters: Option<&'static Parameters>,
+    /// What the probe can touch, in place of what the machine file says.
+    pub workpiece: Option<&'static [Solid]>,
+}
+
+impl Options {
+    /// What the probe can touch.
+    fn workpiece<'a>(&self, machine: &'a Machine) -> &'a [Solid] {
+        self.workpiece.unwrap_or(&machine.workpiece)
+    }
 }
 
 impl Default for Options {
@@ -80,6 +92,7 @@ impl Default for Options {
             home: false,
             faults: &[],
             parameters: None,
+            workpiece: None,
         }
     }
 }
@@ -161,11 +174,14 @@ pub fn run_checked<O: Observer + Send>(
     program: &Program,
     machine: &Machine,
     options: &Options,
-    checked: Checked,
+    mut checked: Checked,
     outputs: impl FnOnce(&Simulation) -> O + Send,
     progress: impl FnMut(&Progress) -> ControlFlow<()> + Send,
     judged: impl FnMut(&mut O, &Judged) + Send,
 ) -> Result<(Summary, Option<O>), Diagnostic> {
+    if let Some(span) = checked.probes.filter(|_| options.workpiece(machine).is_empty()) {
+        checked.diagnostics.push(messages::probe_not_wired(program, span));
+    }
     if checked.has_errors() {
         return Ok((Summary::refused(program, machine, checked), None));
     }
@@ -188,7 +204,9 @@ fn drive<O: Observer>(
     mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
     mut judged: impl FnMut(&mut O, &Judged),
 ) -> Result<(Summary, Option<O>), Diagnostic> {
-    let mut controller = Controller::new(program, machine, options, false)?;
+    // A machine without a program for its spindle is simulated without it.
+    let has_spindle = checked.turns || checked.probes.is_some();
+    let mut controller = Controller::new(program, machine, options, (false, has_spindle))?;
     let mut outputs = outputs(&controller.simulation);
     let mut account = Account::new(machine, &controller.simulation);
     let mut findings = checked.diagnostics;
@@ -224,7 +242,8 @@ fn drive<O: Observer>(
         };
         judged(&mut outputs, &period);
     }
-    let Controller { simulation, feeder, .. } = &controller;
+    let Controller { simulation, feeder, .. } = &mut controller;
+    findings.append(&mut feeder.chains.warnings);
     let mut summary = account.finish(program, machine, simulation, feeder);
     summary.completed = completed && !findings.iter().any(|d| d.severity == Severity::Error);
     summary.diagnostics = findings;

@@ -6,7 +6,7 @@ use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_hal_sim::{Fault, HalError, HomingError, PinFault};
 use pkm_kins::{InverseError, JointLimit, Kinematics, Pose, Side, maths};
 use pkm_machine::{Machine, Refusal, SwitchTarget};
-use pkm_planner::{PlanError, PlanErrorKind};
+use pkm_planner::{PlanError, PlanErrorKind, SpindleOrder, Stage, SynchronisedMove};
 use std::io;
 
 fn at(
@@ -107,6 +107,7 @@ pub(crate) fn plan(program: &Program, machine: &Machine, error: &PlanError) -> D
             at(program, error.span, &inner.code().to_string(), Severity::Error, message, help)
         }
         PlanErrorKind::NoFeed => feed_unset(program, error.span),
+        PlanErrorKind::NoPitch => pitch_zero(program, error.span),
         _ => at(
             program,
             error.span,
@@ -298,4 +299,137 @@ pub(crate) const TOO_MANY: &str = "too-many";
 pub(crate) fn too_many(program: &Program, kept: usize) -> Diagnostic {
     let message = format!("only the first {kept} findings are listed");
     at(program, Span::default(), TOO_MANY, Severity::Note, message, "mend these and check again")
+}
+
+fn pitch_zero(program: &Program, span: Span) -> Diagnostic {
+    let message = "a move in step with the spindle whose travel per turn is not above 0".to_owned();
+    at(program, span, "pitch-zero", Severity::Error, message, "give the pitch: K (in G76: P) above 0")
+}
+
+/// S0.
+pub(crate) fn spindle_stands(program: &Program, span: Span) -> Diagnostic {
+    let message = "a move in step with a spindle whose speed is 0".to_owned();
+    at(program, span, "spindle-speed-zero", Severity::Error, message, "give an S word above 0 before it")
+}
+
+/// The spindle cannot turn as fast as it is told.
+pub(crate) fn spindle_too_slow(program: &Program, span: Span, wanted: f64, most: f64) -> Diagnostic {
+    let message = format!("the spindle would have to turn at {wanted:.1} rpm; it reaches {most:.1} rpm");
+    let help = "lower S (or I of G33.1), or correct spindle.max_speed_rpm in the machine file";
+    at(program, span, "spindle-speed-limit", Severity::Error, message, help)
+}
+
+/// The joints cannot follow the spindle.
+pub(crate) fn spindle_too_fast(
+    program: &Program,
+    step: &SynchronisedMove,
+    fastest_rpm: f64,
+    is_tap: bool,
+) -> Diagnostic {
+    let rpm = step.turns_s * 60.0;
+    let speed = step.turns_s * step.per_turn;
+    let message = format!(
+        "at {rpm:.1} rpm this move would need {speed:.3} mm/s{}; the highest speed that works here is {:.1} rpm",
+        if is_tap { " (or the spindle more turns to stop in)" } else { "" },
+        pkm_kins::maths::floor(fastest_rpm * 10.0) / 10.0
+    );
+    let help =
+        "lower S; the joints' velocities and accelerations set this speed, with a tenth kept for catching up";
+    at(program, step.span, "spindle-too-fast", Severity::Error, message, help)
+}
+
+/// The joints cannot follow the spindle's ramps.
+pub(crate) fn spindle_ramp(program: &Program, span: Span, rate: f64, most: f64) -> Diagnostic {
+    let message = format!(
+        "a tap here can follow a spindle that changes its speed by {most:.1} rpm/s, this one does by {rate:.1}"
+    );
+    let help = "lower spindle.acceleration_rpm_s in the machine file (and in the drive)";
+    at(program, span, "spindle-ramp", Severity::Error, message, help)
+}
+
+/// The spindle did not do what a move in step with it waited for.
+pub(crate) fn spindle_timeout(
+    program: &Program,
+    span: Span,
+    stage: Stage,
+    order: &SpindleOrder,
+    rpm: f64,
+    timeout_s: f64,
+) -> Diagnostic {
+    let (code, what) = match stage {
+        Stage::AtSpeed => ("spindle-not-at-speed", "the spindle did not reach its speed"),
+        Stage::Index => ("spindle-no-index", "the spindle's index did not come"),
+        _ => ("spindle-stands", "the spindle stood still during a move in step with it"),
+    };
+    let wanted = order.speed_rpm;
+    let message = format!("{what} within {timeout_s} s: {wanted:.1} rpm are commanded, it turns at {rpm:.1}");
+    let help = "check the drive and spindle.0.at-speed, or raise spindle.timeout_s in the machine file";
+    at(program, span, code, Severity::Error, message, help)
+}
+
+pub(crate) fn chain_too_long(program: &Program, span: Span, most: usize) -> Diagnostic {
+    let message = format!("more than {most} moves in step with the spindle without a break");
+    at(program, span, "chain-too-long", Severity::Error, message, "make them fewer and longer")
+}
+
+/// The move ended before the tool had caught up.
+pub(crate) fn never_in_step(program: &Program, span: Span) -> Diagnostic {
+    let message = "the tool never caught up with the spindle: the move is too short for its speed".to_owned();
+    let help = "begin further away (the first turns are run-in), or lower S";
+    at(program, span, "never-in-step", Severity::Warning, message, help)
+}
+
+/// What a check takes for granted about a probe.
+pub(crate) fn probe_assumed(program: &Program, span: Span, known: bool) -> Diagnostic {
+    let message = if known {
+        "probing moves are checked to their end; what follows, from where they meet the workpiece"
+    } else {
+        "probing moves are checked to their end, and what follows as if they met something there"
+    };
+    let help = "--probe-surface (or probe.workpiece in the machine file) says what there is to meet";
+    at(program, span, "probe-assumed", Severity::Note, message.to_owned(), help)
+}
+
+/// A probing move on a machine without a probe.
+pub(crate) fn probe_not_wired(program: &Program, span: Span) -> Diagnostic {
+    let message = "this machine has no probe: nothing is said of what it could meet".to_owned();
+    let help = "give --probe-surface \"Z-5\", or probe.workpiece in the machine file";
+    at(program, span, "probe-not-wired", Severity::Error, message, help)
+}
+
+/// The probe is already where the move should bring it.
+pub(crate) fn probe_at_start(program: &Program, span: Span, away: bool) -> Diagnostic {
+    let (message, help) = if away {
+        ("the probe touches nothing when the move away from contact begins", "begin in contact")
+    } else {
+        ("the probe already touches when the move towards contact begins", "back off first")
+    };
+    at(program, span, "probe-at-start", Severity::Error, message.to_owned(), help)
+}
+
+/// G38.2 and G38.4 must trip.
+pub(crate) fn probe_no_contact(
+    program: &Program,
+    machine: &Machine,
+    span: Span,
+    away: bool,
+    end: &Pose,
+) -> Diagnostic {
+    let (what, code) = if away { ("lost no contact", "G38.5") } else { ("met nothing", "G38.3") };
+    let message = format!("the probe {what} on its way to {}", place(machine, end));
+    let help = format!("probe further, or use {code}, which sets #5070 instead");
+    at(program, span, "probe-no-contact", Severity::Error, message, &help)
+}
+
+/// M19 did not end.
+pub(crate) fn orient_timeout(program: &Program, span: Span, timeout_s: f64) -> Diagnostic {
+    let message = format!("the spindle did not reach its angle within {timeout_s} s");
+    at(
+        program,
+        span,
+        "spindle-not-oriented",
+        Severity::Error,
+        message,
+        "check the drive and spindle.0.is-oriented",
+    )
 }

@@ -7,6 +7,7 @@
 use crate::check::check;
 use crate::feeder::Feeder;
 use crate::limited::limited;
+use crate::probing::Shadow;
 use crate::program::Program;
 use crate::{Options, messages};
 use pkm_canon::diagnostic::{Diagnostic, Severity};
@@ -15,7 +16,8 @@ use pkm_machine::Machine;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Seconds under each limit: `feed`, `p1 velocity`, `p1 acceleration`, `dwell`, or `look-ahead` where nothing is at its
+/// Seconds under each limit: `feed`, `p1 velocity`, `p1 acceleration`, `dwell`, `spindle` (in step with it, or waiting for it),
+/// or `look-ahead` where nothing is at its
 /// limit (short moves from stop to stop, rounding to whole servo periods).
 pub type Shares = BTreeMap<String, f64>;
 
@@ -59,7 +61,10 @@ pub struct Plan {
 /// # Errors
 /// The program cannot be read.
 pub fn plan(program: &Program, machine: &Machine, options: &Options) -> Result<Plan, Diagnostic> {
-    let checked = check(program, machine, options)?;
+    let mut checked = check(program, machine, options)?;
+    if let Some(span) = checked.probes.filter(|_| options.workpiece(machine).is_empty()) {
+        checked.diagnostics.push(messages::probe_not_wired(program, span));
+    }
     let mut plan = Plan {
         schema: crate::SCHEMA,
         program: program.name(),
@@ -87,6 +92,7 @@ pub fn plan(program: &Program, machine: &Machine, options: &Options) -> Result<P
 fn drive(program: &Program, machine: &Machine, options: &Options, plan: &mut Plan) -> Result<(), Diagnostic> {
     let options = Options { substeps: 1, ..*options };
     let mut feeder = Feeder::new(program, machine, &options)?;
+    let mut shadow = Shadow::new(machine, options.workpiece(machine));
     let period_s = machine.servo_period_ns as f64 / 1e9;
     let start = feeder.setpoint().joints;
     let mut before = [start; 2];
@@ -98,16 +104,20 @@ fn drive(program: &Program, machine: &Machine, options: &Options, plan: &mut Pla
             plan.diagnostics.push(messages::max_ticks(program, options.max_ticks, feeder.line()));
             return Ok(());
         }
-        feeder.next(ticks).map_err(|e| *e.0)?;
+        feeder.feedback(&shadow.feedback);
+        let told = feeder.next(ticks).map_err(|e| *e.0)?;
+        shadow.step(&told);
         let setpoint = *feeder.setpoint();
         let moves = setpoint.joints != before[1];
         if moves {
             first.get_or_insert(ticks - 1);
             last = ticks;
         }
-        if moves || setpoint.state == pkm_planner::State::Dwell {
-            let (limit, _) = limited(machine, &setpoint, &before, period_s);
-            let words = limit.words(machine);
+        if moves || setpoint.state == pkm_planner::State::Dwell || feeder.is_in_step() {
+            let words = match feeder.is_in_step() {
+                true => "spindle".to_owned(),
+                false => limited(machine, &setpoint, &before, period_s).0.words(machine),
+            };
             *blocks.entry(setpoint.span.line).or_default().entry(words).or_default() += period_s;
         }
         before = [before[1], setpoint.joints];

@@ -147,7 +147,7 @@ impl<'a> Rehearsal<'a> {
         if let Some(error) = checked.diagnostics.iter().find(|d| d.severity == Severity::Error) {
             return Err(error.clone());
         }
-        let mut controller = Controller::new(program, machine, &options, true)?;
+        let mut controller = Controller::new(program, machine, &options, (true, true))?;
         let mut kept = Self {
             program,
             machine,
@@ -291,7 +291,7 @@ impl<'a> Rehearsal<'a> {
         session: &mut Session,
         rows: &mut Vec<Row>,
     ) -> Result<Option<Stop>, Diagnostic> {
-        let mut controller = Controller::new(self.program, self.machine, &self.options, true)?;
+        let mut controller = Controller::new(self.program, self.machine, &self.options, (true, true))?;
         self.inject(&mut controller.simulation, faults)?;
         let mut stop = None;
         while !controller.is_done() && stop.is_none() {

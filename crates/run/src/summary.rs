@@ -48,6 +48,19 @@ pub struct ClosestApproach {
     pub joint: String,
 }
 
+/// How well the tool kept step with the spindle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Synchronisation {
+    /// Chains of moves in step.
+    pub threads: u64,
+    /// Rigid taps.
+    pub taps: u64,
+    /// Largest |pitch × turns − place on the path| at the ends of servo periods, while in step.
+    pub max_error_mm: f64,
+    /// Servo periods in step.
+    pub ticks_in_step: u64,
+}
+
 /// The summary of a run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
@@ -89,6 +102,9 @@ pub struct Summary {
     pub delayed_steps: u64,
     /// ns
     pub max_step_delay_ns: u64,
+    /// Of a program with motion in step with the spindle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub synchronisation: Option<Synchronisation>,
     /// What a person should know.
     #[serde(skip)]
     pub diagnostics: Vec<Diagnostic>,
@@ -130,6 +146,7 @@ impl Summary {
             driver_timing_violations: 0,
             delayed_steps: 0,
             max_step_delay_ns: 0,
+            synchronisation: None,
             diagnostics: checked.diagnostics,
             parameters: None,
         }
@@ -155,6 +172,8 @@ pub(crate) struct Account<'a> {
     reach_mm: f64,
     singularity: f64,
     closest: (u32, usize),
+    /// Largest error in step, and periods in step.
+    in_step: (f64, u64),
 }
 
 impl<'a> Account<'a> {
@@ -175,6 +194,7 @@ impl<'a> Account<'a> {
             reach_mm: 0.0,
             singularity: f64::INFINITY,
             closest: (0, 0),
+            in_step: (0.0, 0),
         }
     }
 
@@ -224,6 +244,10 @@ impl<'a> Account<'a> {
             self.first_motion.get_or_insert(self.ticks - 1);
             self.last_motion = self.ticks;
         }
+        if let Some(error_mm) = feeder.synchronisation_error_mm(&simulation.report().feedback.spindle) {
+            let (most, ticks) = self.in_step;
+            self.in_step = (most.max(error_mm.abs()), ticks + 1);
+        }
         if feeder.is_switching() {
             return judged;
         }
@@ -272,6 +296,10 @@ impl<'a> Account<'a> {
                 steps: counted.steps,
                 min_pulse_interval_ns: counted.min_pulse_interval_ns.unwrap_or(0),
             });
+        let (max_error_mm, ticks_in_step) = self.in_step;
+        let (threads, taps) = (feeder.chains.threads, feeder.chains.taps);
+        let synchronisation =
+            (threads + taps > 0).then_some(Synchronisation { threads, taps, max_error_mm, ticks_in_step });
         let largest =
             |f: fn(&pkm_hal_sim::JointStatistics) -> f64| statistics.iter().map(f).fold(0.0, f64::max);
         Summary {
@@ -297,6 +325,7 @@ impl<'a> Account<'a> {
             driver_timing_violations: statistics.iter().map(|s| s.violations.total()).sum(),
             delayed_steps: statistics.iter().map(|s| s.delayed_steps).sum(),
             max_step_delay_ns: statistics.iter().map(|s| s.max_delay_ns).max().unwrap_or(0),
+            synchronisation,
             diagnostics: Vec::new(),
             parameters: None,
         }

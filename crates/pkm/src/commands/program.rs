@@ -83,8 +83,11 @@ impl Text {
             }
             None => (None, None),
         };
+        let surfaces = &arguments.probe_surface;
+        let workpiece = (!surfaces.is_empty()).then(|| &*Box::leak(surfaces.clone().into_boxed_slice()));
         let options = Options {
             block_delete: arguments.block_delete,
+            workpiece,
             start_line: arguments.bounds.start_line,
             max_blocks: arguments.bounds.max_blocks,
             tools,

@@ -47,6 +47,13 @@ pub(crate) fn text(summary: &Summary) -> String {
         summary.closest_approach.joint,
         summary.driver_timing_violations
     );
+    if let Some(in_step) = &summary.synchronisation {
+        let _ = writeln!(
+            text,
+            "  in step with the spindle: {} threads, {} taps, {} servo periods, at most {:.3e} mm off",
+            in_step.threads, in_step.taps, in_step.ticks_in_step, in_step.max_error_mm
+        );
+    }
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
     table.set_header([

@@ -8,3 +8,4 @@ mod harness;
 mod operator;
 mod random;
 mod runtime;
+mod synchronised;
