@@ -210,24 +210,21 @@ fn interpret(
                     }
                     let refused =
                         check_move(program, machine, &mechanism, &limits, (&step, span), &mut findings);
-                    seen(&Programmed {
-                        geometry: &step.geometry,
-                        rapid: step.rapid,
-                        line: if span.file == FileId(0) { span.line } else { 0 },
-                        mechanism: &mechanism,
-                        refused,
-                    });
+                    seen(&programmed(&step.geometry, step.rapid, span, &mechanism, refused));
                 }
                 Event::Synchronised(step) => {
                     checked.moves += 1;
                     checked.turns = true;
-                    check_in_step(program, machine, &limits, &mechanism, (&step, None), &mut findings);
+                    let alone = (&step, None);
+                    let refused = check_in_step(program, machine, &limits, &mechanism, alone, &mut findings);
+                    seen(&programmed(&step.geometry, false, span, &mechanism, refused));
                 }
                 Event::RigidTap { step, retract_scale } => {
                     checked.moves += 1;
                     checked.turns = true;
                     let tap = (&step, Some(retract_scale));
-                    check_in_step(program, machine, &limits, &mechanism, tap, &mut findings);
+                    let refused = check_in_step(program, machine, &limits, &mechanism, tap, &mut findings);
+                    seen(&programmed(&step.geometry, false, span, &mechanism, refused));
                 }
                 Event::Probe(step, probe) => {
                     if checked.probes.is_none() {
@@ -235,7 +232,9 @@ fn interpret(
                         findings.push(messages::probe_assumed(program, span, !workpiece.is_empty()));
                     }
                     checked.moves += 1;
-                    check_move(program, machine, &mechanism, &limits, (&step, span), &mut findings);
+                    let refused =
+                        check_move(program, machine, &mechanism, &limits, (&step, span), &mut findings);
+                    seen(&programmed(&step.geometry, false, span, &mechanism, refused));
                     let met = contact(workpiece, &step.geometry, probe.away);
                     let place = step.geometry.at(met.unwrap_or(step.geometry.length())).position;
                     // Nothing known: as if it met something at the end.
@@ -288,17 +287,29 @@ fn check_in_step(
     mechanism: &Mechanism,
     (step, retract_scale): (&SynchronisedMove, Option<f64>),
     findings: &mut Vec<Diagnostic>,
-) {
+) -> Option<Pose> {
     let feed = Feed { speed: f64::INFINITY, group: FeedGroup::Xyz };
     let SynchronisedMove { geometry, mode, span, .. } = *step;
     let along = Move { geometry, feed, rapid: true, mode, span };
-    check_move(program, machine, mechanism, limits, (&along, span), findings);
+    let refused = check_move(program, machine, mechanism, limits, (&along, span), findings);
     // What cannot be reached is told; how fast that would be says nothing.
     if findings.iter().all(|finding| finding.severity != Severity::Error)
         && let Err(finding) = judge(program, machine, limits, mechanism, step, retract_scale)
     {
         findings.push(finding);
     }
+    refused
+}
+
+fn programmed<'a>(
+    geometry: &'a Geometry,
+    rapid: bool,
+    span: Span,
+    mechanism: &'a Mechanism,
+    refused: Option<Pose>,
+) -> Programmed<'a> {
+    let line = if span.file == FileId(0) { span.line } else { 0 };
+    Programmed { geometry, rapid, line, mechanism, refused }
 }
 
 /// A switch without motion.
