@@ -224,6 +224,7 @@ impl Simulation {
 
     /// Ends the emergency stop. The machine stands where the steps stand: [`Self::feedback`]; setpoints start there.
     pub fn reset(&mut self) {
+        self.hal.with_component(MOTION, |motion: &mut Motion, _| motion.release());
         self.enable(true);
     }
 

@@ -3,6 +3,7 @@
 mod common;
 
 use common::{config, machine};
+use pkm_hal_sim::components::spindle::SpindleCommand;
 use pkm_hal_sim::{Edge, Line, Observer, Setpoint, SetpointSource, Simulation, TickReport, Value};
 
 /// Steps after a tick.
@@ -134,4 +135,144 @@ fn after_any_fault_the_machine_stands_and_can_go_on() {
     set(&mut simulation, "joint.1.f-error-lim", Value::Float(1e-7));
     let fault = (0..10).find_map(|_| simulation.tick(&mut source, &mut []).err()).unwrap();
     assert!(fault.to_string().starts_with("joint.1.f-error is "), "{fault}");
+}
+
+#[test]
+fn a_limit_switch_can_only_be_left() {
+    let mut config = config(2, 100);
+    for joint in &mut config.joints {
+        (joint.start, joint.max_acceleration) = (0.0, 1000.0);
+    }
+    for (pin, forbidden) in [("joint.0.pos-lim-sw-in", 1.0), ("joint.0.neg-lim-sw-in", -1.0)] {
+        let mut simulation = Simulation::new(&config).unwrap();
+        let on = |simulation: &mut Simulation, on| simulation.hal_mut().setp(pin, Value::Bit(on)).unwrap();
+        simulation.tick_to(&Setpoint::default(), &mut []).unwrap();
+        on(&mut simulation, true);
+        let fault = simulation.tick_to(&Setpoint::default(), &mut []).unwrap_err();
+        assert!(fault.to_string().starts_with(pin), "{fault}");
+        while simulation.drives_on() {
+            simulation.idle(&mut []).unwrap();
+        }
+        simulation.reset();
+        // it stands on the switch, and may
+        let mut setpoint = Setpoint::default();
+        simulation.tick_to(&setpoint, &mut []).unwrap();
+        let mut towards = simulation.clone();
+        setpoint.joints[0] = 0.0005 * forbidden;
+        let fault = towards.tick_to(&setpoint, &mut []).unwrap_err();
+        assert!(fault.to_string().starts_with(pin), "{fault}");
+        // away, the contact bouncing when it opens
+        let mut speed = 0.0;
+        setpoint.joints[0] = 0.0;
+        for tick in 0..200 {
+            speed = f64::min(speed + 0.0005, 0.01);
+            setpoint.joints[0] -= speed * forbidden;
+            setpoint.velocities[0] = -speed * forbidden * 1000.0;
+            on(&mut simulation, tick < 100 || [103, 104, 110].contains(&tick));
+            simulation.tick_to(&setpoint, &mut []).unwrap_or_else(|fault| panic!("tick {tick}: {fault}"));
+        }
+        // and then it is a limit switch again
+        on(&mut simulation, true);
+        assert!(simulation.tick_to(&setpoint, &mut []).is_err());
+    }
+}
+
+#[test]
+fn a_stall_without_encoder_shows_at_the_next_homing() {
+    use pkm_hal_sim::{HomeJoint, Homing, HomingConfig, Switches};
+    use pkm_kins::JointRange;
+    let mut config = config(1, 100);
+    let limits = JointRange { min: -900.0, max: 900.0 };
+    let joint = &mut config.joints[0];
+    (joint.start, joint.max_acceleration, joint.following_error) = (0.0, 1000.0, 0.0075);
+    joint.switches = Some(Switches {
+        home: 2.0,
+        home_below: true,
+        limits,
+        bounce_ns: 3_000_000,
+        seed: 3,
+        index_pitch: 0.0,
+    });
+    let mut simulation = Simulation::new(&config).unwrap();
+    // no encoder: what is fed back are the steps
+    let hal = simulation.hal_mut();
+    hal.unlink("joint.0.motor-pos-fb").unwrap();
+    hal.net("j0-stepped", &["joint.0.motor-pos-fb"]).unwrap();
+    let (mut setpoint, mut speed) = (Setpoint::default(), 0.0);
+    for tick in 1..=300 {
+        if tick == 100 {
+            simulation.hal_mut().inject(&"100+20,driver.0.step,freeze".parse().unwrap()).unwrap();
+        }
+        speed = f64::min(speed + 0.001, 0.02);
+        setpoint.joints[0] += speed;
+        setpoint.velocities[0] = speed * 1000.0;
+        simulation.tick_to(&setpoint, &mut []).unwrap_or_else(|fault| panic!("noticed: {fault}"));
+    }
+    while speed > 0.0 {
+        speed = f64::max(speed - 0.001, 0.0);
+        setpoint.joints[0] += speed;
+        setpoint.velocities[0] = speed * 1000.0;
+        simulation.tick_to(&setpoint, &mut []).unwrap();
+    }
+    let lost = simulation.feedback()[0] - simulation.true_joints()[0];
+    assert!(lost > 0.3, "{lost}: nothing was lost");
+    let home = HomeJoint {
+        name: "p1".to_owned(),
+        search_velocity: -20.0,
+        latch_velocity: 2.0,
+        switch: 2.0,
+        home: 3.0,
+        sequence: 0,
+        use_index: false,
+        travel: 100.0,
+        velocity: 20.0,
+        acceleration: 1000.0,
+    };
+    let at = simulation.feedback()[0];
+    simulation.forget_home();
+    let mut homing = Homing::new(HomingConfig { period_s: 0.001, debounce_s: 0.025 }, vec![home], &[at]);
+    while !homing.is_done() {
+        simulation.home(&mut homing, &mut []).unwrap();
+    }
+    assert!(simulation.is_homed());
+    let (reported, real) = (simulation.feedback()[0], simulation.true_joints()[0]);
+    assert!((reported - real).abs() <= 1.0 / 400.0, "{reported} {real}");
+    let shown = simulation.home_offsets()[0];
+    assert!((shown - lost).abs() <= 1.0 / 400.0, "homing found {shown}, {lost} were lost");
+}
+
+#[test]
+fn after_a_loss_of_power_the_machine_does_not_know_where_it_is() {
+    let (mut simulation, mut source) = machine(2);
+    for _ in 0..100 {
+        simulation.tick(&mut source, &mut []).unwrap();
+    }
+    assert!(simulation.is_homed());
+    simulation.forget_home();
+    assert!(!simulation.is_homed());
+    // begun anew: unknown, every joint at 0 wherever it stands
+    let mut config = config(2, 100);
+    (config.joints[0].start, config.joints[1].start, config.homed) = (12.5, -3.0, false);
+    let simulation = Simulation::new(&config).unwrap();
+    assert!(!simulation.is_homed());
+    assert_eq!(simulation.hal().getp("joint.0.homed"), Ok(Value::Bit(false)));
+    assert_eq!(simulation.feedback(), [0.0; 9]);
+    assert_eq!(simulation.true_joints()[..2], [12.5, -3.0]);
+}
+
+#[test]
+fn an_emergency_stop_turns_the_spindle_off() {
+    let mut config = config(1, 100);
+    config.spindle = Some(pkm_hal_sim::SpindleConfig { max_speed_rpm: 3000.0, acceleration_rpm_s: 1000.0 });
+    let mut simulation = Simulation::new(&config).unwrap();
+    let turning = SpindleCommand { on: true, speed_rpm: 600.0, ..SpindleCommand::default() };
+    let joints = simulation.report().setpoint.joints;
+    let setpoint = Setpoint { spindle: turning, joints, ..Setpoint::default() };
+    for _ in 0..50 {
+        simulation.tick_to(&setpoint, &mut []).unwrap();
+    }
+    assert_eq!(simulation.hal().getp("spindle.0.on"), Ok(Value::Bit(true)));
+    simulation.emergency_stop();
+    simulation.idle(&mut []).unwrap();
+    assert_eq!(simulation.hal().getp("spindle.0.on"), Ok(Value::Bit(false)));
 }

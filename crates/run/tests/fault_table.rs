@@ -334,3 +334,31 @@ fn the_judge_convicts() {
         assert!(moved.contains("still moves"), "{moved}");
     });
 }
+
+/// Every test that `docs/hal.md` names exists, and every test here is named there.
+#[test]
+fn the_table_names_tests_that_exist() {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    let manual = std::fs::read_to_string(format!("{root}/docs/hal.md")).unwrap();
+    let text = |file: &str| {
+        ["run", "hal-sim"]
+            .iter()
+            .find_map(|package| std::fs::read_to_string(format!("{root}/crates/{package}/tests/{file}")).ok())
+    };
+    let mut named = Vec::new();
+    for line in manual.lines().filter(|line| line.starts_with('|')) {
+        let Some((file, test)) = line.rsplit('`').nth(1).and_then(|word| word.split_once("::")) else {
+            continue;
+        };
+        let text = text(file).unwrap_or_else(|| panic!("no file {file}"));
+        assert!(text.contains(&format!("#[test]\nfn {test}()")), "no test {test} in {file}");
+        named.push(test.to_owned());
+    }
+    assert!(named.len() > 20, "{named:?}");
+    for test in include_str!("fault_table.rs").split("#[test]\nfn ").skip(1) {
+        let name = test.split('(').next().unwrap();
+        let here = name == "the_table_names_tests_that_exist"
+            || !name.chars().all(|c| c.is_alphanumeric() || c == '_');
+        assert!(here || named.iter().any(|test| test == name), "{name} is not in docs/hal.md");
+    }
+}

@@ -269,6 +269,12 @@ impl Motion {
         self.mode == Mode::Stopped
     }
 
+    /// As if `motion.enable` had been false for a period: a stop is over when it is true.
+    pub(crate) const fn release(&mut self) {
+        self.mode = Mode::Follows;
+        self.was_enabled = false;
+    }
+
     /// The drives are on, as of the last period.
     pub fn drives_on(&self) -> bool {
         self.was_enabled && self.mode != Mode::Stopped
