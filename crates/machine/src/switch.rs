@@ -118,7 +118,11 @@ impl Machine {
         Ok(())
     }
 
-    fn check_axes(&self, pose: &Pose) -> Result<(), Refusal> {
+    /// Checks a pose against the ranges of the axes.
+    ///
+    /// # Errors
+    /// The first axis outside its range.
+    pub fn check_axes(&self, pose: &Pose) -> Result<(), Refusal> {
         for limits in &self.axes {
             let Some(range) = limits.range else { continue };
             let value = pose.get(limits.axis);

@@ -52,6 +52,8 @@ pub(crate) enum Command {
     Kins(Kins),
     /// Play a compact step stream (steps.pkms): its steps as CSV, or its sums
     Steps(Steps),
+    /// Jog the simulated machine: joints or coordinates, within soft limits and singularity guards
+    Jog(Jog),
     /// Run a HAL file, or show what a HAL has
     Hal(Hal),
     /// List the machines that ship, or print one annotated machine file
@@ -74,6 +76,7 @@ impl Command {
             Self::Run(arguments) => &arguments.program.machine.set,
             Self::Check(arguments) => &arguments.program.machine.set,
             Self::Plan(arguments) => &arguments.program.machine.set,
+            Self::Jog(arguments) => &arguments.machine.set,
             Self::Hal(arguments) => match &arguments.command {
                 Some(HalCommand::Show(arguments)) => &arguments.set,
                 None => &arguments.set,
@@ -344,6 +347,21 @@ pub(crate) enum StepsFormat {
     Json,
     /// Every step: time_ns, joint (from 0), step (1 or -1), count since the start
     Csv,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Jog {
+    #[command(flatten)]
+    pub machine: MachineArgs,
+    /// Where the machine stands, e.g. "X0 Y-260" (mm, degrees); default: its home pose
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pub start: Option<String>,
+    /// mm/s or degrees/s
+    #[arg(long, value_name = "V", default_value_t = 10.0)]
+    pub velocity: f64,
+    /// Jogs, one after the other: an axis or a joint's name, + or -, and how far (nothing: to the limit): x+10 y- p1+2.5
+    #[arg(required = true)]
+    pub moves: Vec<String>,
 }
 
 /// A HAL file as LinuxCNC's halcmd reads it: loadrt, addf, net, setp, sets, linkpp, show, ...

@@ -19,6 +19,7 @@ fn main() -> ExitCode {
         cli::Command::Plan(arguments) => commands::plan::run(arguments, &messages),
         cli::Command::Canon(arguments) => commands::canon::run(arguments, &messages),
         cli::Command::Hal(arguments) => commands::hal::run(arguments, &messages),
+        cli::Command::Jog(arguments) => commands::jog::run(arguments),
         cli::Command::Kins(command) => commands::kins::run(command),
         cli::Command::Steps(arguments) => commands::steps::run(arguments),
         cli::Command::Machines(arguments) => commands::machines::run(arguments),

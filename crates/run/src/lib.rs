@@ -8,6 +8,7 @@ mod check;
 mod controller;
 mod deviation;
 mod feeder;
+mod jog;
 mod judged;
 mod language;
 mod limited;
@@ -22,6 +23,8 @@ mod synchronised;
 mod wiring;
 
 pub use check::{Checked, Programmed, check, check_with};
+pub use check::{Checked, check};
+pub use jog::{Jog, JogEnd, Jogged, jog};
 pub use judged::Judged;
 pub use language::check_language;
 pub use limited::{Limited, limited};

@@ -7,6 +7,7 @@ pub(crate) mod generate;
 pub(crate) mod hal;
 pub(crate) mod import_linuxcnc;
 pub(crate) mod ini;
+pub(crate) mod jog;
 pub(crate) mod kins;
 pub(crate) mod linuxcnc;
 pub(crate) mod machines;

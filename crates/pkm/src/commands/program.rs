@@ -136,7 +136,7 @@ fn keep(name: &str, input: impl Read) -> Result<Program, Failure> {
 }
 
 /// A pose as `--start` states it: letters and numbers, mm and degrees; what is absent is as at home.
-fn start(machine: &Machine, text: &str) -> Result<Pose, Failure> {
+pub(crate) fn start(machine: &Machine, text: &str) -> Result<Pose, Failure> {
     let refuse = |message: String| {
         Failure::could_not(
             "start",
