@@ -23,7 +23,6 @@ mod synchronised;
 mod wiring;
 
 pub use check::{Checked, Programmed, check, check_with};
-pub use check::{Checked, check};
 pub use jog::{Jog, JogEnd, Jogged, jog};
 pub use judged::Judged;
 pub use language::check_language;
