@@ -302,6 +302,8 @@ if (!only) {
   check((await page.textContent('#line-1')).includes('</script><script>'), 'nasty: line 1 is not shown as it is');
   check((await page.textContent('#verdict')).includes('refused'), 'nasty: no verdict');
   check((await page.textContent('.row.chosen b')) === '4', 'nasty: does not open where it fails');
+  const past = await page.evaluate(() => pkm.data.values('joints', pkm.player.tick)[0] - pkm.data.joints[0].range[1]);
+  check(past > 1, `nasty: joint p1 is drawn ${past} mm past its end`);
   await page.screenshot({ path: join(artefacts, 'refused.png') });
   await context.close();
   const still = run('no-motion', 'moma-a', 'G21 (nothing moves)\nM2\n');

@@ -207,12 +207,13 @@ pkm.scene = (() => {
       context.stroke();
       context.setLineDash([]);
       if (data.workspaces.length > 1 && !space.name.includes(',') && space.loops[0]) {
-        // Its name, at its lowest point.
-        const [x, y] = space.loops[0].map((p) => camera.project(p)).reduce((a, b) => (b[1] > a[1] ? b : a));
+        // Its name: below it, or above it if only its edge is drawn.
+        const side = space.filled ? 1 : -1;
+        const [x, y] = space.loops[0].map((p) => camera.project(p)).reduce((a, b) => (side * (b[1] - a[1]) > 0 ? b : a));
         context.fillStyle = colours.soft;
         context.font = '11px system-ui, sans-serif';
         context.textAlign = 'center';
-        context.fillText(space.name, x, y + 13);
+        context.fillText(space.name, x, y + (space.filled ? 14 : -7));
       }
     }
   }
@@ -396,8 +397,10 @@ pkm.scene = (() => {
           const outwards = p[0][0] < camera.rect.x + camera.rect.width / 2 ? -1 : 1;
           context.fillStyle = past ? colours.finding : colour;
           context.font = '600 12px system-ui, sans-serif';
-          context.textAlign = outwards < 0 ? 'right' : 'left';
-          context.fillText(past ? `${part.name} past its end` : part.name, p[0][0] + 12 * outwards, p[0][1] + 4);
+          const level = Math.abs(d[0]) > 2 * Math.abs(d[1]);
+          context.textAlign = level ? 'center' : outwards < 0 ? 'right' : 'left';
+          const [x, y] = level ? [p[0][0], p[0][1] + 22] : [p[0][0] + 12 * outwards, p[0][1] + 4];
+          context.fillText(past ? `${part.name} past its end` : part.name, x, y);
         }
         break;
       }

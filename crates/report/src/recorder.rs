@@ -8,7 +8,7 @@ use crate::programmed::{Corner, Path};
 use crate::sample::Sample;
 use crate::skeleton::Drawing;
 use crate::workspace::{Space, spaces};
-use pkm_kins::{Axis, Joints, Kinematics, Pose};
+use pkm_kins::{Axis, Joints, Kinematics, Mechanism, Pose};
 use pkm_machine::Machine;
 use pkm_run::{Judged, Programmed, Summary};
 use std::io::{self, BufRead, Write};
@@ -161,7 +161,7 @@ impl<'a> Recorder<'a> {
         } else {
             error = 0.0;
             rows.truncate(1);
-            self.sample_path(&corners, &mechanisms, &mut rows);
+            self.sample_path(&corners, &mechanisms, &refused, &mut rows);
         }
         Recorded { recorder: self, rows, error, corners, refused, timed }
     }
@@ -170,14 +170,15 @@ impl<'a> Recorder<'a> {
     fn sample_path(
         &mut self,
         corners: &[Corner],
-        mechanisms: &[(f64, pkm_kins::Mechanism)],
+        mechanisms: &[(f64, Mechanism)],
+        refused: &[(u32, Pose)],
         rows: &mut Vec<Sample>,
     ) {
         let total = corners.last().map_or(0.0, Corner::length);
         let spacing = SPACING_MM.max(total / MOST_SAMPLES);
         let mut from = self.start;
         let mut at = 0.0;
-        self.blocks = Blocks::default();
+        let mut refused = refused.iter().peekable();
         for corner in corners {
             let length = corner.length();
             let steps = if corner.start { 1 } else { ((length - at) / spacing).ceil().max(1.0) as u32 };
@@ -194,14 +195,33 @@ impl<'a> Recorder<'a> {
                         pose.set(axis, from.get(axis) + share * (corner.pose.get(axis) - from.get(axis)));
                     }
                 }
-                let Ok(joints) = mechanism.inverse(&pose) else { continue };
-                let tick = rows.len() as u64;
-                self.blocks.push(corner.line, tick);
-                let mut sample = Sample::still(self.machine, &self.axes, tick, pose, joints);
-                sample.line = corner.line;
-                rows.push(sample);
+                let mut place = |pose: Pose| {
+                    let Ok(joints) = mechanism.inverse(&pose) else { return };
+                    let mut sample = Sample::still(self.machine, &self.axes, 0, pose, joints);
+                    sample.line = corner.line;
+                    rows.push(sample);
+                };
+                // The refused place itself, where the path passes it: there a joint is past its end the furthest.
+                if let Some((_, bad)) = refused.next_if(|(line, bad)| {
+                    *line == corner.line && distance(bad, &pose) <= 1.01 * (length - at) / f64::from(steps)
+                }) {
+                    place(*bad);
+                }
+                place(pose);
             }
             (from, at) = (corner.pose, length);
         }
+        self.blocks = Blocks::default();
+        for (row, tick) in rows.iter_mut().zip(0..) {
+            row.tick = tick;
+            if tick > 0 {
+                self.blocks.push(row.line, tick);
+            }
+        }
     }
+}
+
+/// The largest difference of any coordinate.
+fn distance(a: &Pose, b: &Pose) -> f64 {
+    a.to_array().iter().zip(b.to_array()).fold(0.0, |most, (a, b)| (a - b).abs().max(most))
 }
