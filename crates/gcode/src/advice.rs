@@ -50,12 +50,15 @@ impl Interpreter {
     /// The diagnostic of an error that the last step returned: its own file and line, the calls that led there, and the
     /// word that may have been meant. `program` is the path of the program as the person gave it.
     pub fn diagnose(&self, error: &Error, source: &dyn LineSource, program: &str) -> Diagnostic {
-        let (labels, missing) = self.labels();
-        let names = Names {
-            parameters: self.parameters().names().map(text).collect(),
-            labels: labels.map(text).collect(),
-            missing: missing.map(text),
-        };
+        let mut names = Names::default();
+        if matches!(error.kind, ErrorKind::ParamUndefined | ErrorKind::ONotFound) {
+            let (labels, missing) = self.labels();
+            names = Names {
+                parameters: self.parameters().names().map(text).collect(),
+                labels: labels.map(text).collect(),
+                missing: missing.map(text),
+            };
+        }
         let mut diagnostic = diagnostic(error, self.source_line_of(error.span), source, program, &names);
         let calls = self.calls().filter(|call| *call != error.span);
         diagnostic.notes.extend(calls.map(|call| note("called from here", call, source, program)));

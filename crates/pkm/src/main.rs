@@ -6,6 +6,7 @@ mod interrupt;
 mod outcome;
 mod output;
 mod render;
+mod storage;
 
 use clap::Parser;
 use std::process::ExitCode;

@@ -368,6 +368,7 @@ impl Interpreter {
         source: &mut dyn LineSource,
         sink: &mut dyn CanonSink,
     ) -> Result<Status, Error> {
+        self.count_block(here)?;
         let trimmed = self.line.raw().trim_ascii_start();
         let framed = self.phase == Phase::Running { framed: true };
         match trimmed {
@@ -389,7 +390,6 @@ impl Interpreter {
             _ => {}
         }
         self.line.prepare()?;
-        self.count_block(here)?;
         let start = self.line.skip_number()?;
         self.state.source_line = self.line.number;
         if self.line.code().get(start) == Some(&b'o') {

@@ -2,7 +2,7 @@
 //! cannot end.
 
 use super::names::{Parameter, Unknowns};
-use super::{Finding, MOST_FILES, Name, Region, StaticCheck};
+use super::{Finding, MOST_FILES, MOST_FINDINGS, Name, Region, StaticCheck};
 use crate::block::fault_error;
 use crate::error::{Error, ErrorKind};
 use crate::expression::{self, UNKNOWN};
@@ -10,7 +10,7 @@ use crate::lexer::{Keyword, into_fault};
 use crate::o_word;
 use crate::parameters::{ARGUMENTS, Parameters};
 use crate::source::LineSource;
-use alloc::collections::BTreeSet;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 use pkm_canon::Span;
 use pkm_canon::diagnostic::Severity;
@@ -373,20 +373,21 @@ impl StaticCheck<'_> {
             return;
         }
         // Called from the main program, directly or not.
-        let mut reached: BTreeSet<Name> = BTreeSet::from([Name::new()]);
-        loop {
-            let before = reached.len();
-            let calls = self.calls.iter().filter(|(_, (.., callers))| !callers.is_disjoint(&reached));
-            let more: Vec<Name> = calls.map(|(label, _)| label.clone()).collect();
-            reached.extend(more);
-            if reached.len() == before {
-                break;
-            }
+        let mut callees: BTreeMap<&Name, Vec<&Name>> = BTreeMap::new();
+        for (label, (.., callers)) in &self.calls {
+            callers.iter().for_each(|caller| callees.entry(caller).or_default().push(label));
+        }
+        let main = Name::new();
+        let mut reached: BTreeSet<&Name> = BTreeSet::from([&main]);
+        let mut waiting = Vec::from([&main]);
+        while let Some(caller) = waiting.pop() {
+            let called = callees.get(caller).into_iter().flatten().copied();
+            waiting.extend(called.filter(|label| reached.insert(label)));
         }
         let unused: Vec<(Span, Vec<u8>)> = self
             .definitions
             .iter()
-            .filter(|(label, definition)| definition.own && !reached.contains(*label))
+            .filter(|(label, definition)| definition.own && !reached.contains(label))
             .map(|(_, definition)| (definition.span, definition.line.clone()))
             .collect();
         for (span, line) in unused {
@@ -397,6 +398,9 @@ impl StaticCheck<'_> {
     /// A finding about a line read before.
     pub(super) fn add_line(&mut self, kind: ErrorKind, span: Span, severity: Severity, line: &[u8]) {
         let error = Error { kind, span };
+        if self.findings.len() >= MOST_FINDINGS {
+            return;
+        }
         self.findings.push(Finding { error, severity, line: line.to_vec(), other: None });
     }
 }

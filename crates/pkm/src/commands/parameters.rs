@@ -2,15 +2,27 @@
 //! content (promise P7).
 
 use crate::outcome::Failure;
-use crate::output::Folder;
+use crate::output::failure;
+use crate::storage::{self, Disk};
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_gcode::{ParameterFile, Parameters};
-use std::fs::File;
-use std::io::{ErrorKind, Read, Write};
+use std::fs::{File, create_dir_all};
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// The largest parameter file that is read.
 const MOST_BYTES: u64 = 1 << 20;
+
+/// What to do about a damaged file: the content before it may be there.
+fn remedy(path: &Path, kind: pkm_gcode::ErrorKind) -> String {
+    let mut bak = path.as_os_str().to_owned();
+    bak.push(".bak");
+    let bak = PathBuf::from(bak);
+    match bak.is_file() {
+        true => format!("{}; the content before the last save is in {}", kind.help(), bak.display()),
+        false => format!("{}; there is no {}", kind.help(), bak.display()),
+    }
+}
 
 /// A parameter file that was read, to save it later.
 pub(crate) struct Kept {
@@ -49,7 +61,7 @@ impl Kept {
             code: kind.code().into(),
             severity: Severity::Error,
             message: kind.to_string(),
-            help: Some(kind.help().into()),
+            help: Some(remedy(path, kind)),
             file: name,
             line,
             column: 1,
@@ -70,18 +82,20 @@ impl Kept {
         };
         let name = self.path.file_name().and_then(|name| name.to_str());
         let name = name.ok_or_else(|| told("this is no name of a parameter file"))?;
-        let beside = self.path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let folder = Folder::new(beside.unwrap_or(Path::new(".")))?;
-        let write = |name: &str, text: &[u8]| {
-            let mut pending = folder.create(name)?;
-            pending.write_all(text).map_err(|error| folder.failure(name, &error))?;
-            Ok::<_, Failure>(pending)
-        };
+        if self.path.is_dir() {
+            return Err(told("this is a folder"));
+        }
+        // Behind a link stands the file itself; the link stays.
+        let path = self.path.canonicalize().unwrap_or_else(|_| self.path.clone());
+        if let Some(folder) = path.parent() {
+            create_dir_all(folder).map_err(|error| failure(folder, &error))?;
+        }
+        let text = self.file.text(parameters);
         let mut files = Vec::new();
         if let Some(old) = &self.old {
-            files.push(write(&format!("{name}.bak"), old)?);
+            files.push((self.path.with_file_name(format!("{name}.bak")), &old[..]));
         }
-        files.push(write(name, &self.file.text(parameters))?);
-        folder.commit(files)
+        files.push((path, &text[..]));
+        storage::save(&mut Disk::default(), &files).map_err(|(path, error)| failure(&path, &error))
     }
 }

@@ -195,7 +195,10 @@ impl Interpreter {
         let saved = self.state.forget_saved();
         if self.state.settings.dialect == Dialect::Pkm {
             let scope = self.flow.frames.len() as u32 + 2;
-            drop(self.flow.constructs.split_off(&Name { scope, label: 0 }));
+            // One by one: splitting the map would allocate.
+            while self.flow.constructs.last_key_value().is_some_and(|(name, _)| name.scope >= scope) {
+                self.flow.constructs.pop_last();
+            }
         }
         let arguments = (frame.style == Style::OWord).then_some(frame.arguments);
         self.state.leave_sub(arguments);
