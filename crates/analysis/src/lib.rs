@@ -5,4 +5,5 @@
 
 pub mod checker;
 pub mod outcome;
+pub mod parallel;
 pub mod workspace;

@@ -2,9 +2,11 @@
 //!
 //! [`views`] takes a machine apart into the planes in which its workspace is a [`Region`] of the plane: one for a planar
 //! mechanism, both forms of an O-X glide, the wire of a MOMA-W at a table position and tilt, both spindles of an HV-Mill.
-//! What moves along the plane's normal makes a volume of the area. Spatial machines are scanned plane by plane.
+//! What moves along the plane's normal makes a volume of the area. [`polar`] scans spatial machines plane by plane.
 
 mod curve;
+pub mod map;
+pub mod polar;
 mod region;
 
 pub use curve::Curve;

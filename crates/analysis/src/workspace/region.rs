@@ -152,7 +152,7 @@ pub(crate) enum Constraint {
 }
 
 impl Constraint {
-    fn holds(&self, t: Vec2) -> bool {
+    pub(crate) fn holds(&self, t: Vec2) -> bool {
         match self {
             Self::Travel(chain) => chain.solve(t).is_some_and(|(p, _)| chain.range.contains(p)),
             Self::Assembly { chains: [first, second], side } => match (first.solve(t), second.solve(t)) {
@@ -267,6 +267,11 @@ impl Region {
     /// True if T (mm) is in the set.
     pub fn contains(&self, t: Vec2) -> bool {
         self.constraints.iter().all(|constraint| constraint.holds(t))
+    }
+
+    /// The conditions that no mechanism's reach, travel or mode makes.
+    pub(crate) fn walls(&self) -> impl Iterator<Item = &Constraint> {
+        self.constraints.iter().filter(|constraint| matches!(constraint, Constraint::HalfPlane { .. }))
     }
 
     /// A box around the set (not the smallest), mm.
