@@ -8,3 +8,4 @@ mod programs;
 mod run;
 mod smoke;
 mod support;
+mod views;

@@ -74,6 +74,8 @@ pub struct Tables {
     /// `[[switch]]`: M codes that switch the mechanism.
     #[serde(default)]
     pub switch: Vec<Spanned<Switch>>,
+    /// `[configure]`: the configurations of a reconfigurable machine.
+    pub configure: Option<crate::family::ConfigureFile>,
 }
 
 /// One `[[switch]]`.

@@ -13,6 +13,7 @@
 
 mod checks;
 pub mod drivers;
+pub mod family;
 pub mod file;
 mod homing;
 mod joint;

@@ -27,7 +27,15 @@ pub const SHIPPED: &[(&str, &str)] = &[
     ("xyzabc", include_str!("../../../machines/xyzabc.toml")),
 ];
 
-/// The text of a shipped machine file.
+/// Name and text of every shipped family: a machine file with a table `[configure]`; by itself it is its first configuration.
+pub const FAMILIES: &[(&str, &str)] = &[
+    ("moma", include_str!("../../../machines/moma.toml")),
+    ("moma-4s", include_str!("../../../machines/moma-4s.toml")),
+    ("ox-glide", include_str!("../../../machines/ox-glide.toml")),
+    ("hv-mill", include_str!("../../../machines/hv-mill.toml")),
+];
+
+/// The text of a shipped machine or family file.
 pub fn text(name: &str) -> Option<&'static str> {
-    SHIPPED.iter().find(|(shipped, _)| *shipped == name).map(|(_, text)| *text)
+    SHIPPED.iter().chain(FAMILIES).find(|(shipped, _)| *shipped == name).map(|(_, text)| *text)
 }

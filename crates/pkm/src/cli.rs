@@ -47,6 +47,12 @@ pub(crate) enum Command {
     Plan(Plan),
     /// Interpret without a machine and print canonical commands in LinuxCNC's text format
     Canon(Canon),
+    /// What a machine can reach: exact areas and volumes, singular loci, pictures
+    Workspace(Workspace),
+    /// Which configuration of a reconfigurable machine runs a program, best first
+    Configure(Configure),
+    /// Pictures of a trace or of a program's run: the path and the joints over time
+    Plot(Plot),
     /// Pose to joints and back, JSON lines in and out
     #[command(subcommand)]
     Kins(Kins),
@@ -77,6 +83,9 @@ impl Command {
             Self::Check(arguments) => &arguments.program.machine.set,
             Self::Plan(arguments) => &arguments.program.machine.set,
             Self::Jog(arguments) => &arguments.machine.set,
+            Self::Workspace(arguments) => &arguments.machine.set,
+            Self::Configure(arguments) => &arguments.program.machine.set,
+            Self::Plot(arguments) => &arguments.set,
             Self::Hal(arguments) => match &arguments.command {
                 Some(HalCommand::Show(arguments)) => &arguments.set,
                 None => &arguments.set,
@@ -218,6 +227,75 @@ pub(crate) struct Plan {
     /// How many of the longest blocks the text lists
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub longest: usize,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Workspace {
+    #[command(flatten)]
+    pub machine: MachineArgs,
+    /// Write workspace.svg, .png, .csv and .json into this folder (and .obj of a spatial machine)
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Distance of the poses of the det K map, or of the planes of a spatial machine, mm; boundaries of planar mechanisms are
+    /// exact and do not depend on it
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    pub resolution: Option<f64>,
+    /// MOMA-W: position of the table, mm; default: home
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    pub z: Option<f64>,
+    /// MOMA-W: angle of the wire towards x, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub tilt_x: f64,
+    /// MOMA-W: angle of the wire towards y, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub tilt_y: f64,
+    /// How the summary is printed
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+}
+
+/// What is best.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RankBy {
+    /// The shortest cycle time, then the farthest from singularities, then the shortest travel
+    Time,
+    /// The farthest from singularities
+    Singularity,
+    /// The shortest travel of the joint that needs most
+    Travel,
+}
+
+#[derive(Debug, Args)]
+#[command(mut_arg("machine", |machine| machine.required(true)))]
+pub(crate) struct Configure {
+    #[command(flatten)]
+    pub program: ProgramArgs,
+    /// What ranks the configurations
+    #[arg(long, value_enum, default_value_t = RankBy::Time)]
+    pub rank_by: RankBy,
+    /// Threads; the answer does not depend on them. Default: all cores
+    #[arg(long, value_name = "N", value_parser = threads)]
+    pub threads: Option<usize>,
+}
+
+/// 1 to 1024.
+fn threads(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|threads| (1..=1024).contains(threads)).ok_or_else(|| "1 to 1024".into())
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Plot {
+    /// A trace.csv of `pkm run`, or a G-code program, which is run
+    pub input: PathBuf,
+    /// Machine file or name: needed for a program; with a trace it adds limits, names and the workspace
+    #[arg(long, value_name = "FILE")]
+    pub machine: Option<String>,
+    /// Override a key of the machine file; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Write path.svg, path.png, joints.svg and joints.png into this folder
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -5,6 +5,7 @@
 //! simulated HAL and judges the edges. Memory does not grow with the length of the program.
 
 mod check;
+pub mod configure;
 mod controller;
 mod deviation;
 mod feeder;
@@ -28,7 +29,7 @@ pub use judged::Judged;
 pub use language::check_language;
 pub use limited::{Limited, limited};
 pub use pkm_analysis::outcome::{Objection, Outcome};
-pub use plan::{BlockPlan, Plan, Shares, plan};
+pub use plan::{BlockPlan, JointUse, Plan, Shares, plan};
 pub use program::Program;
 pub use rehearsal::{Played, Rehearsal};
 pub use summary::{ClosestApproach, JointSummary, SCHEMA, Summary, Synchronisation};

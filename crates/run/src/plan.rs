@@ -12,6 +12,7 @@ use crate::program::Program;
 use crate::{Options, messages};
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_hal_sim::SetpointSource;
+use pkm_kins::Kinematics;
 use pkm_machine::Machine;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -30,6 +31,17 @@ pub struct BlockPlan {
     pub duration_s: f64,
     /// Seconds of it under each limit.
     pub limited_by_s: Shares,
+}
+
+/// What a program uses of one joint; mm or degrees.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct JointUse {
+    /// As the machine file names it.
+    pub name: String,
+    /// Lowest position.
+    pub min: f64,
+    /// Highest position.
+    pub max: f64,
 }
 
 /// The plan of a program.
@@ -51,6 +63,10 @@ pub struct Plan {
     pub limited_by_s: Shares,
     /// The largest of them in words.
     pub verdict: String,
+    /// What the motion uses of every joint, in joint order.
+    pub joints: Vec<JointUse>,
+    /// Smallest singularity measure on the way (a form switch does not count); 0 if nothing was driven.
+    pub min_singularity_distance: f64,
     /// What a person should know.
     #[serde(skip)]
     pub diagnostics: Vec<Diagnostic>,
@@ -74,6 +90,8 @@ pub fn plan(program: &Program, machine: &Machine, options: &Options) -> Result<P
         blocks: Vec::new(),
         limited_by_s: Shares::new(),
         verdict: "refused before anything moves".to_owned(),
+        joints: Vec::new(),
+        min_singularity_distance: 0.0,
         diagnostics: checked.diagnostics,
     };
     if plan.diagnostics.iter().any(|d| d.severity == Severity::Error) {
@@ -98,6 +116,7 @@ fn drive(program: &Program, machine: &Machine, options: &Options, plan: &mut Pla
     let mut before = [start; 2];
     let mut blocks: BTreeMap<u32, Shares> = BTreeMap::new();
     let (mut ticks, mut first, mut last) = (0_u64, None, 0);
+    let (mut lowest, mut highest, mut nearest) = (start, start, f64::INFINITY);
     while !feeder.is_done() {
         ticks += 1;
         if ticks > options.max_ticks {
@@ -121,7 +140,24 @@ fn drive(program: &Program, machine: &Machine, options: &Options, plan: &mut Pla
             *blocks.entry(setpoint.span.line).or_default().entry(words).or_default() += period_s;
         }
         before = [before[1], setpoint.joints];
+        for ((low, high), q) in lowest.iter_mut().zip(&mut highest).zip(setpoint.joints) {
+            (*low, *high) = (low.min(q), high.max(q));
+        }
+        if !feeder.is_switching()
+            && let Ok(measure) = feeder.mechanism().singularity(&setpoint.pose)
+        {
+            nearest = nearest.min(measure.inverse.min(measure.forward));
+        }
     }
+    let ends = machine.joints.iter().zip(lowest.into_iter().zip(highest));
+    plan.joints = ends
+        .map(|(joint, (low, high))| JointUse {
+            name: joint.name.clone(),
+            min: joint.to_face(low),
+            max: joint.to_face(high),
+        })
+        .collect();
+    plan.min_singularity_distance = if nearest.is_finite() { nearest } else { 0.0 };
     plan.diagnostics.extend(feeder.failure().cloned());
     plan.completed = feeder.failure().is_none();
     plan.duration_s = (last - first.unwrap_or(last)) as f64 * period_s;

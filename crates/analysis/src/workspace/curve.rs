@@ -142,6 +142,14 @@ impl Curve {
         into.extend((0..count).map(|k| self.at(k as f64 / count as f64)));
     }
 
+    /// Points of the piece from end to end, chords at most `tolerance_mm` off.
+    pub fn polyline(&self, tolerance_mm: f64) -> Vec<Vec2> {
+        let mut points = Vec::new();
+        self.points(tolerance_mm, &mut points);
+        points.push(self.at(1.0));
+        points
+    }
+
     /// The share at which the piece passes `point`, if it does within [`SAME_MM`].
     pub(crate) fn share_of(&self, point: Vec2) -> Option<f64> {
         let share = match *self {

@@ -4,18 +4,21 @@
 //! mechanism, both forms of an O-X glide, the wire of a MOMA-W at a table position and tilt, both spindles of an HV-Mill.
 //! What moves along the plane's normal makes a volume of the area. [`polar`] scans spatial machines plane by plane.
 
+pub(crate) mod contour;
 mod curve;
 pub mod map;
 pub mod polar;
 mod region;
+pub mod report;
 
 pub use curve::Curve;
 pub use region::{Boundary, Cause, Piece, Region};
 
-use curve::cross;
-use region::{Chain, Constraint};
+use curve::{cross, distance};
+use region::{Chain, Constraint, parallel_links};
 
 use pkm_kins::machine::Mechanism;
+use pkm_kins::maths::{radians, tan};
 use pkm_kins::{
     Axis, HvMill, JointRange, Kinematics, OxForm, OxGlide, OxGlideParameters, Planar, Pose, Spindle, Vec2,
 };
@@ -27,8 +30,8 @@ use std::fmt;
 pub struct Section {
     /// MOMA-W: the table's position, mm; its home without.
     pub z_mm: Option<f64>,
-    /// MOMA-W: (u − x, v − y), mm: how far the wire leans from contour plane to contour plane.
-    pub lean_mm: [f64; 2],
+    /// MOMA-W: angle of the wire to the planes' normal, in the x-z and in the y-z plane, degrees: u − x = D tan, v − y = D tan.
+    pub tilt_deg: [f64; 2],
 }
 
 /// One plane of a machine.
@@ -191,6 +194,25 @@ impl View {
         self.mechanisms.iter().map(|pair| pair.determinant(t)).product::<f64>() * self.factor
     }
 
+    /// Singular loci in the working modes, with guides that have no ends, within a box: type 1 and type 2.
+    pub fn loci(&self, [low, high]: [Vec2; 2]) -> [Vec<Curve>; 2] {
+        let middle = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])];
+        let half = distance(low, high);
+        let mut loci = [Vec::new(), Vec::new()];
+        for pair in &self.mechanisms {
+            for chain in &pair.chains {
+                loci[0].extend(chain.square_around(middle, half));
+            }
+            loci[1].extend(parallel_links(&pair.chains, middle, half));
+        }
+        loci
+    }
+
+    /// Both sliders on one rail: an O-X glide.
+    pub fn is_glide(&self) -> bool {
+        self.reachable.walls().any(|wall| matches!(wall, Constraint::HalfPlane { cause: Cause::Rails, .. }))
+    }
+
     /// The mechanism in the pose T (mm), chain by chain; `None` out of reach.
     pub fn linkage(&self, t: Vec2) -> Option<Vec<Limb>> {
         let limb = |chain: &Chain| {
@@ -295,10 +317,11 @@ pub fn outline(machine: &Machine, tolerance_mm: f64) -> Vec<Outline> {
 /// O-X glide: both forms. As chains: both guides on the rail y = 0, offsets ∓s/2, modes ∓form.
 fn ox_glide(machine: &Machine, glide: &OxGlide, ranges: &[JointRange]) -> Vec<View> {
     let [l, s, c_min] = glide.dimensions_mm();
-    let rail = Constraint::HalfPlane { point: [0.0; 2], normal: [0.0, 1.0], cause: Cause::Limit };
+    let rail = Constraint::HalfPlane { point: [0.0; 2], normal: [0.0, 1.0], cause: Cause::Rails };
     // |c| ≥ c_min is y ≤ √(l² − c_min²).
     let highest = ((l - c_min) * (l + c_min)).sqrt();
-    let guard = Constraint::HalfPlane { point: [0.0, highest], normal: [0.0, -1.0], cause: Cause::Limit };
+    let guard =
+        Constraint::HalfPlane { point: [0.0, highest], normal: [0.0, -1.0], cause: Cause::FormSwitch };
     let form = |form: OxForm, sign: f64, name: &str| {
         let chain = |joint: usize, offset: f64, mode: f64| Chain {
             joint,
@@ -370,9 +393,14 @@ fn moma_w(
     section: &Section,
     ranges: &[JointRange],
 ) -> Result<View, WorkspaceError> {
-    let (b, w, d) = wire.frames_mm();
+    let (b, _, d) = wire.frames_mm();
     let z = section.z_mm.unwrap_or(machine.home.z);
-    let lean = section.lean_mm;
+    let [tilt_x, tilt_y] = section.tilt_deg;
+    if !(tilt_x.abs() < 89.0 && tilt_y.abs() < 89.0) {
+        let message = format!("a wire cannot be tilted by {tilt_x}° and {tilt_y}°: less than 89° each");
+        return Err(WorkspaceError::Section { message });
+    }
+    let lean = [d * tan(radians(tilt_x)), d * tan(radians(tilt_y))];
     if !ranges[4].contains(z) {
         let (min, max) = (ranges[4].min, ranges[4].max);
         let message = format!("the table cannot be at z = {z} mm (travel {min} to {max} mm)");
@@ -392,10 +420,7 @@ fn moma_w(
     let one_sided = m1.planar.is_one_sided() || m2.planar.is_one_sided();
     let home = [machine.home.x, machine.home.y];
     let mut view = View {
-        name: format!(
-            "the wire at z = {z} mm, leaning ({}, {}) mm over {d} mm; b_z = {} mm, w_z = {} mm",
-            lean[0], lean[1], b[2], w[2]
-        ),
+        name: format!("wire at z = {z} mm, tilted {tilt_x}° and {tilt_y}°"),
         axes: [Axis::X, Axis::Y],
         reachable: Region { constraints: if one_sided { usable.clone() } else { reachable } },
         usable: Region { constraints: usable },

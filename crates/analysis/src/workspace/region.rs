@@ -23,7 +23,11 @@ pub enum Cause {
     Type2,
     /// The prolonged guide line of this chain: a link may lie on one side only.
     GuideLine(usize),
-    /// A limit of the machine itself: the rails, the form switch, an axis.
+    /// The rails of an O-X glide.
+    Rails,
+    /// The guard around its form switch.
+    FormSwitch,
+    /// A limit of an axis of the machine.
     Limit,
 }
 
@@ -133,8 +137,14 @@ impl Chain {
         }
     }
 
-    /// The two lines on which the link is square to the guide, for sliders from `low` to `high`.
-    pub(crate) fn square(&self, low: f64, high: f64) -> [Curve; 2] {
+    /// The two lines on which the link is square to the guide, `half` mm to both sides of what is nearest to `middle`.
+    pub(crate) fn square_around(&self, middle: Vec2, half: f64) -> [Curve; 2] {
+        let (along, _) = self.project(middle);
+        self.square(along - half, along + half)
+    }
+
+    /// The same for sliders from `low` to `high`.
+    fn square(&self, low: f64, high: f64) -> [Curve; 2] {
         [self.link, -self.link]
             .map(|off| Curve::Segment { from: self.place(low, off), to: self.place(high, off) })
     }

@@ -2,6 +2,7 @@
 
 pub(crate) mod canon;
 pub(crate) mod check;
+pub(crate) mod configure;
 pub(crate) mod faults;
 pub(crate) mod generate;
 pub(crate) mod hal;
@@ -13,7 +14,9 @@ pub(crate) mod linuxcnc;
 pub(crate) mod machines;
 pub(crate) mod parameters;
 pub(crate) mod plan;
+pub(crate) mod plot;
 pub(crate) mod program;
 pub(crate) mod run;
 pub(crate) mod steps;
 pub(crate) mod tool_table;
+pub(crate) mod workspace;
