@@ -29,7 +29,8 @@ pub(crate) fn run(arguments: &Machines) -> Result<Outcome, Failure> {
         out.write_all(text.as_bytes())?;
         return Ok(Outcome::Clean);
     }
-    let rows = shipped::SHIPPED.iter().map(|(name, _)| row(name)).collect::<Result<Vec<Row>, Failure>>()?;
+    let names = shipped::SHIPPED.iter().chain(shipped::FAMILIES).map(|(name, _)| row(name));
+    let rows = names.collect::<Result<Vec<Row>, Failure>>()?;
     match arguments.format {
         Format::Json => {
             let list = serde_json::json!({ "schema": 1, "machines": rows });
