@@ -78,7 +78,8 @@ impl Hal {
 
 fn print(name: &CStr, message: &Message) {
     let name = name.as_ptr();
-    // SAFETY: every format in `message` takes the arguments of its kind, in this order; `%.*s` gets the length of its text.
+    // SAFETY: every format in `message` takes the arguments of its kind, in this order, and only simple
+    // conversions: motmod's message handler has its own reader of formats, and `%.*s` makes it crash.
     unsafe {
         match *message {
             Message::Plain(format, a, b) => rtapi_print_msg(RTAPI_MSG_ERR, format.as_ptr(), name, a, b),
@@ -86,21 +87,30 @@ fn print(name: &CStr, message: &Message) {
                 rtapi_print_msg(RTAPI_MSG_ERR, format.as_ptr(), name, joint, a, b);
             }
             Message::Named(format, text, a, b) => {
-                let length = c_int::try_from(text.len()).unwrap_or(0);
-                rtapi_print_msg(RTAPI_MSG_ERR, format.as_ptr(), name, length, text.as_ptr(), a, b);
+                let text = HalName::text(text);
+                rtapi_print_msg(RTAPI_MSG_ERR, format.as_ptr(), name, text.as_ptr(), a, b);
             }
         }
     }
 }
 
-/// A HAL name, ending in 0: `prefix.part.quantity`.
+/// A name that ends in 0; of HAL: `prefix.part.quantity`.
 struct HalName([u8; 48]);
 
 impl HalName {
     fn new(prefix: &str, name: Name) -> Self {
-        let mut bytes = [0; 48];
         let dot = if name.part.is_empty() { "" } else { "." };
-        let text = [prefix, ".", name.part, dot, name.quantity].into_iter().flat_map(str::bytes);
+        Self::of(&[prefix, ".", name.part, dot, name.quantity])
+    }
+
+    /// One text, cut where it is too long.
+    fn text(text: &str) -> Self {
+        Self::of(&[text])
+    }
+
+    fn of(texts: &[&str]) -> Self {
+        let mut bytes = [0; 48];
+        let text = texts.iter().flat_map(|text| text.bytes());
         // The last byte stays 0.
         for (place, byte) in bytes.iter_mut().take(47).zip(text) {
             *place = byte;

@@ -12,7 +12,7 @@ pub(crate) enum Message {
     Plain(&'static CStr, f64, f64),
     /// Joint (counted from 0, as LinuxCNC does), then two numbers.
     Joint(&'static CStr, i32, f64, f64),
-    /// A name (`%.*s`), then two numbers.
+    /// A text, then two numbers.
     Named(&'static CStr, &'static str, f64, f64),
 }
 
@@ -105,7 +105,7 @@ impl From<&InverseError> for Message {
                 Joint(c"%s: joint %d: the ends of the strut coincide\n", i32::from(joint), 0.0, 0.0)
             }
             InverseError::AxisLocked { axis } => Named(
-                c"%s: axis %.*s does not move with the mechanism that is active now\n",
+                c"%s: axis %s does not move with the mechanism that is active now\n",
                 letter(axis),
                 0.0,
                 0.0,
@@ -197,7 +197,7 @@ impl From<&GeometryError> for Message {
     fn from(error: &GeometryError) -> Self {
         let named = |key: pkm_kins::Key, value, limit| {
             Named(
-                c"%s: the geometry makes no mechanism: %.*s = %g (limit %g); machine not moved\n",
+                c"%s: the geometry makes no mechanism: %s = %g (limit %g); machine not moved\n",
                 key.name,
                 value,
                 limit,
@@ -209,7 +209,7 @@ impl From<&GeometryError> for Message {
             }
             GeometryError::NotPositive { key, value } => named(key, value, 0.0),
             GeometryError::NotASign { key, value } => Named(
-                c"%s: the geometry makes no mechanism: %.*s = %g must be 1 or -1\n",
+                c"%s: the geometry makes no mechanism: %s = %g must be 1 or -1\n",
                 key.name,
                 f64::from(value),
                 0.0,
@@ -229,5 +229,28 @@ impl From<&SwitchError> for Message {
             SwitchError::Moving => Plain(c"%s: kinematics can be switched only at rest\n", 0.0, 0.0),
             SwitchError::State(error) => error.into(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    /// motmod reads formats itself: `%`, digits and a point, one of the plain conversions; nothing else.
+    #[test]
+    fn formats_are_plain_and_match_their_arguments() {
+        let (own, _) = include_str!("message.rs").split_once("#[cfg(test)]").unwrap();
+        let source = [own, include_str!("module.rs"), include_str!("ffi.rs")].concat();
+        let mut formats = 0;
+        for format in source.split("c\"%s: ").skip(1).filter_map(|rest| rest.split('"').next()) {
+            formats += 1;
+            for conversion in format.split('%').skip(1) {
+                let letter =
+                    conversion.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.').chars().next();
+                assert!(matches!(letter, Some('s' | 'd' | 'f' | 'g' | 'e')), "{format}");
+            }
+            assert!(format.ends_with("\\n"), "{format}");
+        }
+        assert!(formats > 40, "{formats}");
     }
 }

@@ -140,18 +140,13 @@ impl<M: Mechanism> State<M> {
         });
         let made = if let Some(quantity) = unset {
             Err(Message::Named(
-                c"%s: the geometry is not set: a %.*s is no number; setp it\n",
+                c"%s: the geometry is not set: a %s is no number; setp it\n",
                 quantity,
                 0.0,
                 0.0,
             ))
         } else if let Some(quantity) = too_large {
-            Err(Message::Named(
-                c"%s: the geometry makes no mechanism: %.*s is too large\n",
-                quantity,
-                0.0,
-                0.0,
-            ))
+            Err(Message::Named(c"%s: the geometry makes no mechanism: %s is too large\n", quantity, 0.0, 0.0))
         } else {
             M::new(&parameters, self.machine.as_ref()).map_err(|error| Message::from(&error))
         };

@@ -156,8 +156,12 @@ struct Module {
     _loading: std::sync::MutexGuard<'static, ()>,
 }
 
-/// The shared object of this name that cargo built beside this test.
+/// The shared object of this name that cargo built beside this test, or in the folder of `PKM_MODULES`: the modules as they
+/// are installed.
 fn shared_object(name: &str) -> PathBuf {
+    if let Some(folder) = std::env::var_os("PKM_MODULES") {
+        return PathBuf::from(folder).join(format!("lib{name}.so"));
+    }
     let exe = std::env::current_exe().unwrap();
     let profile = exe.parent().unwrap().parent().unwrap();
     profile.join(format!("examples/lib{name}.so"))
