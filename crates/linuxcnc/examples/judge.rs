@@ -180,6 +180,14 @@ impl Switching<'_> {
             joints[..3].copy_from_slice(&pose[..3]);
             return Ok(joints);
         }
+        if let Mechanism::Cartesian(machine) = self.now {
+            // LinuxCNC's trivkins: nothing is converted.
+            let mut joints = [0.0; MAX_JOINTS];
+            for (joint, axis) in joints.iter_mut().zip(Kinematics::axes(&machine).iter()) {
+                *joint = pose[axis as usize];
+            }
+            return Ok(joints);
+        }
         let mut inner = Pose::from_array(*pose);
         [inner.a, inner.b, inner.c] = [inner.a, inner.b, inner.c].map(maths::radians);
         let mut joints = self.now.inverse(&inner).map_err(|error| format!("{error} at {pose:?}"))?;

@@ -1,0 +1,163 @@
+//! A machine file becomes a LinuxCNC configuration and comes back.
+
+use pkm_kins::Kinematics;
+use pkm_linuxcnc::{Configuration, configuration, import, module};
+use pkm_linuxcnc_kins::mechanism::Mechanism;
+use pkm_linuxcnc_kins::pkm_kins::*;
+use pkm_linuxcnc_kins::switchable::{HvMachineKins, OxGlideKins};
+use pkm_machine::kinematics::Parameters;
+use pkm_machine::{Machine, MachineFile, shipped};
+
+fn of(name: &str, text: &str) -> (Machine, Configuration) {
+    let file = MachineFile::parse(name, text, &[]).unwrap();
+    let machine = Machine::try_from(file.clone()).unwrap();
+    let configuration = configuration(&file, &machine);
+    (machine, configuration)
+}
+
+fn read<'a>(configuration: &'a Configuration, name: &str) -> Option<&'a str> {
+    configuration.files.iter().find(|(file, _)| file == name).map(|(_, text)| text.as_str())
+}
+
+#[test]
+fn import_of_the_configuration_keeps_every_number() {
+    for (name, text) in shipped::SHIPPED {
+        let (before, configuration) = of(name, text);
+        let ini = read(&configuration, &configuration.ini).unwrap();
+        let imported = import(ini, &|file| read(&configuration, file).map(str::to_owned))
+            .unwrap_or_else(|error| panic!("{name}: {error:?}"));
+        assert!(imported.remarks.is_empty(), "{name}: {:?}", imported.remarks);
+        let after = Machine::parse(name, &imported.toml, &[])
+            .unwrap_or_else(|findings| panic!("{name}: {findings:?}\n{}", imported.toml));
+        assert_eq!(after.name, before.name);
+        assert_eq!(after.mechanism, before.mechanism, "{name}");
+        assert_eq!(after.mechanism_type, before.mechanism_type, "{name}");
+        assert_eq!(after.servo_period_ns, before.servo_period_ns, "{name}");
+        assert_eq!(after.timer_period_ns, before.timer_period_ns, "{name}");
+        assert_eq!(after.home, before.home, "{name}");
+        assert_eq!(after.switches, before.switches, "{name}");
+        assert_eq!(after.path.blend_tolerance, before.path.blend_tolerance, "{name}");
+        assert_eq!(after.singularity.guard, before.singularity.guard, "{name}");
+        assert_eq!(after.axes.len(), before.axes.len(), "{name}");
+        for (a, b) in after.joints.iter().zip(&before.joints) {
+            assert_eq!((&a.name, a.kind, a.range), (&b.name, b.kind, b.range), "{name}");
+            assert_eq!(a.max_velocity.to_bits(), b.max_velocity.to_bits(), "{name}");
+            assert_eq!(a.max_acceleration.to_bits(), b.max_acceleration.to_bits(), "{name}");
+            assert_eq!(a.steps_per_unit.to_bits(), b.steps_per_unit.to_bits(), "{name}");
+            assert_eq!((a.timing, &a.driver), (b.timing, &b.driver), "{name}");
+        }
+        // And a second time: the same configuration.
+        let (_, again) = of(name, &imported.toml);
+        let sorted = |c: &Configuration| {
+            c.files
+                .iter()
+                .filter(|(f, _)| f == "geometry.hal")
+                .map(|(_, t)| {
+                    t.lines().filter(|l| l.starts_with("setp")).map(str::to_owned).collect::<Vec<_>>()
+                })
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(sorted(&again), sorted(&configuration), "{name}");
+    }
+}
+
+/// The modules' own idea of a shipped machine is the machine file's; their HAL names are those the configuration sets.
+fn same<M: Mechanism>(kind: &str)
+where
+    M::Parameters: PartialEq + core::fmt::Debug,
+    Parameters: AsParameters<M::Parameters>,
+{
+    let module = module(kind).unwrap();
+    assert_eq!(module.prefix, M::PREFIX);
+    for (name, parameters) in M::SHIPPED {
+        let Some(text) = shipped::text(name) else { continue };
+        let file = MachineFile::parse(name, text, &[]).unwrap();
+        if file.kinematics.get_ref().kind == kind {
+            assert_eq!(Some(&parameters()), file.kinematics.get_ref().parameters.as_parameters(), "{name}");
+        }
+    }
+}
+
+trait AsParameters<P> {
+    fn as_parameters(&self) -> Option<&P>;
+}
+macro_rules! as_parameters {
+    ($($kind:ident($parameters:ty)),+) => { $(impl AsParameters<$parameters> for Parameters {
+        fn as_parameters(&self) -> Option<&$parameters> {
+            if let Parameters::$kind(p) = self { Some(p) } else { None }
+        }
+    })+ };
+}
+as_parameters!(
+    Moma(MomaParameters),
+    Moma4s(Moma4sParameters),
+    MomaW(MomaWParameters),
+    HvMill(HvMillParameters),
+    HvMachine(HvMachineParameters),
+    OxGlide(OxGlideParameters),
+    Lambda6(Lambda6Parameters)
+);
+
+#[test]
+fn modules_know_the_shipped_machines() {
+    same::<Moma>("moma");
+    same::<Moma4s>("moma-4s");
+    same::<MomaW>("moma-w");
+    same::<HvMill>("hv-mill");
+    same::<HvMachineKins>("hv-machine");
+    same::<OxGlideKins>("ox-glide");
+    same::<Lambda6>("lambda6");
+}
+
+const FOREIGN: &str = "[EMC]\nMACHINE = My Router!\n[TRAJ]\nLINEAR_UNITS = inch\n[EMCMOT]\nSERVO_PERIOD = 1000000\n[KINS]\n\
+    KINEMATICS = trivkins coordinates=xyz\nJOINTS = 3\n[HAL]\nHALFILE = a.hal\nHALFILE = b.tcl\n[AXIS_X]\nMIN_LIMIT = -1\nMAX_LIMIT = 10\nMAX_VELOCITY = 2\n\
+    [JOINT_0]\nMIN_LIMIT = -1\nMAX_LIMIT = 10\nMAX_VELOCITY = 1\nMAX_ACCELERATION = 20\nSCALE = 5080 # steps\nSTEPLEN = 5000\n\
+    [JOINT_1]\nMIN_LIMIT = -1\nMAX_LIMIT = 10\nMAX_VELOCITY = 1\nMAX_ACCELERATION = 20\nSCALE = -5080\n\
+    [JOINT_2]\nMIN_LIMIT = -1\nMAX_LIMIT = 1e99\nMAX_VELOCITY = 1\nMAX_ACCELERATION = 20\n";
+const FOREIGN_HAL: &str = "# stepconf\nloadrt stepgen step_type=0,0,0\nnet xpos-cmd joint.0.motor-pos-cmd => stepgen.2.position-cmd\n\
+    setp stepgen.2.steplen [JOINT_0]STEPLEN\nsetp stepgen.2.stepspace 4000\nsetp stepgen.2.dirsetup 3000\nsetp stepgen.2.dirhold 2000\n";
+
+#[test]
+fn reads_a_foreign_configuration_in_inches() {
+    let read = |file: &str| (file == "a.hal").then(|| FOREIGN_HAL.to_owned());
+    let imported = import(FOREIGN, &read).unwrap();
+    let machine =
+        Machine::parse("foreign", &imported.toml, &[]).unwrap_or_else(|e| panic!("{e:?}\n{}", imported.toml));
+    assert_eq!(machine.name, "My-Router-");
+    assert_eq!(machine.mechanism.axes().iter().count(), 3);
+    let x = &machine.joints[0];
+    assert_eq!((x.range.min, x.range.max, x.steps_per_unit), (-25.4, 254.0, 200.0));
+    assert_eq!(
+        (x.timing.step_length, x.timing.step_space, x.timing.dir_setup, x.timing.dir_hold),
+        (5000, 4000, 3000, 2000)
+    );
+    assert_eq!(machine.axis(Axis::X).unwrap().max_velocity, Some(50.8));
+    for word in ["b.tcl", "negative", "[JOINT_2]SCALE", "[JOINT_2]MAX_LIMIT", "step timing"] {
+        assert!(
+            imported.remarks.iter().any(|remark| remark.contains(word)),
+            "{word}: {:?}",
+            imported.remarks
+        );
+    }
+}
+
+#[test]
+fn refuses_what_it_cannot_read() {
+    let none = |_: &str| None;
+    let code = |ini: &str| import(ini, &none).unwrap_err().code;
+    assert_eq!(code(""), "linuxcnc-ini");
+    assert_eq!(code("\u{0}\u{ff}[[]=\\"), "linuxcnc-ini");
+    assert_eq!(code(&FOREIGN.replace("trivkins", "pumakins")), "linuxcnc-kinematics");
+    assert_eq!(
+        code(&FOREIGN.replace("=xyz", "=xyyz").replace("JOINTS = 3", "JOINTS = 4")),
+        "linuxcnc-kinematics"
+    );
+    assert_eq!(code(&FOREIGN.replace("inch", "furlong")), "linuxcnc-units");
+    assert_eq!(code(&FOREIGN.replace("[JOINT_2]", "[JOINT_5]")), "linuxcnc-joint");
+    let mm = FOREIGN.replace("inch", "mm");
+    assert_eq!(code(&mm.replace("trivkins", "moma_kins")), "linuxcnc-geometry");
+    assert_eq!(code(&mm.replace("trivkins", "moma_kins machine=none")), "linuxcnc-geometry");
+    assert_eq!(code(&FOREIGN.replace("trivkins", "moma_kins")), "linuxcnc-units");
+    assert_eq!(code(&mm.replace("trivkins", "lineardeltakins")), "linuxcnc-geometry");
+    assert_eq!(code(&mm.replace("trivkins", "genhexkins")), "linuxcnc-geometry");
+}
