@@ -362,6 +362,10 @@ impl Judge<'_> {
             return self
                 .object(off, format!("it took {} periods to stop, {slowest:.1} are enough", off - told));
         }
+        // a zero that moved hides how far its joint went
+        if self.rows[before..off].iter().any(|row| row.zeroed) {
+            return Ok(Outcome::BrakedAndOff);
+        }
         for j in 0..self.joints() {
             let way: f64 = (told..off).map(|i| travel(i, j)).sum();
             if way.abs() > 0.5 * travel(before, j).abs() * slowest + TINY {

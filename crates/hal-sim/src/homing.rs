@@ -1,14 +1,14 @@
 //! Homing: every joint finds its home switch, then its zero, and goes to its home position.
 //!
 //! ```text
-//!  on the switch ─▶ leave it ─▶ wait ─▶ search ─▶ leave it ─▶ wait ─▶ latch [─▶ index] ─▶ zero ─▶ (others) ─▶ home
+//!  on the switch ─▶ leave it ─▶ wait ─▶ search ─▶ twice: leave it ─▶ wait ─▶ latch [─▶ index] ─▶ zero ─▶ (others) ─▶ home
 //! ```
 //!
 //! A switch is on from its place to the end of the travel (a flag), so that a joint knows at the start on which side it
 //! stands. *Search* goes towards the flag at the search velocity and brakes when it is on; *latch* comes back at the latch
-//! velocity and takes the place of the **first** edge, by its time; what the contact does afterwards does not count. Before
-//! it the joint waits until the contact has been off for [`HomingConfig::debounce_s`]. With an index, the next index pulse
-//! after the switch counts instead.
+//! velocity and takes the place of the **first** edge, by its time; what the contact does afterwards does not
+//! count. It latches twice, and both must agree. Before each latch the joint waits until the contact has been off for
+//! [`HomingConfig::debounce_s`]. With an index, the next index pulse after the switch counts instead.
 //!
 //! Joints with the same |`sequence`| home at the same time, lower numbers first. A negative number: they wait for each
 //! other before they go to their home positions together, as in LinuxCNC.
@@ -35,6 +35,8 @@ pub struct HomeJoint {
     pub sequence: i32,
     /// The index pulse after the switch is the reference.
     pub use_index: bool,
+    /// How far apart two latches may be.
+    pub repeat: f64,
     /// The longest way in search of a switch.
     pub travel: f64,
     /// Of the last move, mm/s or rad/s.
@@ -75,6 +77,8 @@ pub enum HomingError {
     NotFound { joint: usize, name: String, travel: f64 },
     /// The switch does not let go.
     Stuck { joint: usize, name: String, travel: f64 },
+    /// Two latches found two places.
+    Unsteady { joint: usize, name: String, travel: f64 },
     /// No index pulse came after the switch.
     NoIndex { joint: usize, name: String, travel: f64 },
 }
@@ -85,6 +89,7 @@ impl HomingError {
         match self {
             Self::NotFound { joint, name, travel }
             | Self::Stuck { joint, name, travel }
+            | Self::Unsteady { joint, name, travel }
             | Self::NoIndex { joint, name, travel } => (*joint, name, *travel),
         }
     }
@@ -102,6 +107,13 @@ impl fmt::Display for HomingError {
             Self::NotFound { .. } => "no home switch was found",
             Self::Stuck { .. } => "the home switch stays on",
             Self::NoIndex { .. } => "no index pulse came after the home switch",
+            Self::Unsteady { .. } => {
+                return write!(
+                    f,
+                    "homing of joint {joint} ({name}) failed: the home switch was found at two places, {travel} apart; \
+                     all joints stopped"
+                );
+            }
         };
         write!(f, "homing of joint {joint} ({name}) failed: {what} within {travel}; all joints stopped")
     }
@@ -146,6 +158,8 @@ struct Joint {
     phase: Phase,
     /// Where the phase began.
     from: f64,
+    /// Where the first latch found the reference.
+    first: Option<f64>,
 }
 
 /// The homing of a machine.
@@ -253,6 +267,7 @@ impl Homing {
             free: Free::new(*position),
             phase: Phase::Waits,
             from: *position,
+            first: None,
         };
         let mut homing = Self {
             joints: joints.into_iter().zip(positions).map(joint).collect(),
@@ -280,17 +295,19 @@ impl Homing {
     /// # Errors
     /// [`HomingError`] once all joints stand.
     pub fn tick(&mut self, inputs: &[HomeInput], commands: &mut [HomeCommand]) -> Result<(), HomingError> {
-        if self.failure.is_none() {
-            self.step(inputs, commands);
+        match &self.failure {
+            // the last setpoint said that all stand
+            Some(failure) if self.joints.iter().all(|joint| joint.free.is_done()) => {
+                return Err(failure.clone());
+            }
+            Some(_) => {}
+            None => self.step(inputs, commands),
         }
         for (joint, command) in self.joints.iter_mut().zip(commands.iter_mut()) {
             joint.free.tick();
             (command.position, command.travel) = (joint.free.position(), joint.free.travel());
         }
-        match &self.failure {
-            Some(failure) if self.joints.iter().all(|joint| joint.free.is_done()) => Err(failure.clone()),
-            _ => Ok(()),
-        }
+        Ok(())
     }
 
     fn step(&mut self, inputs: &[HomeInput], commands: &mut [HomeCommand]) {
@@ -311,10 +328,21 @@ impl Homing {
                 };
                 joint.enter(first, period_s);
             }
-            command.homed_by = joint.step(input, period_s, debounce);
-            if let Some(shift) = command.homed_by {
-                joint.free.shift(shift);
-                joint.enter(Phase::Stops, period_s);
+            if let Some(shift) = joint.step(input, period_s, debounce) {
+                match joint.first.replace(shift) {
+                    // once more: a contact that lies is found out
+                    None => joint.enter(Phase::Leaves { then: Then::Latch }, period_s),
+                    Some(first) if (shift - first).abs() <= joint.config.repeat => {
+                        command.homed_by = Some(shift);
+                        joint.free.shift(shift);
+                        joint.enter(Phase::Stops, period_s);
+                    }
+                    Some(first) => {
+                        let (name, travel) = (joint.config.name.clone(), (shift - first).abs());
+                        self.failure =
+                            self.failure.take().or(Some(HomingError::Unsteady { joint: n, name, travel }));
+                    }
+                }
             }
             self.failure = self.failure.take().or_else(|| joint.gave_up(n));
         }

@@ -321,7 +321,9 @@ impl Simulation {
             let cubic = generator.cubic();
             let at = |time: u64| {
                 let part = time.saturating_sub(start) as f64 / f64::from(self.period.ticks());
-                (cubic.base as f64 + cubic.at(part)) / line.steps_per_unit - line.offset
+                // at a steady speed; the cubic's own velocities do not matter
+                let steps = cubic.at(0.0) + part * (cubic.at(1.0) - cubic.at(0.0));
+                (cubic.base as f64 + steps) / line.steps_per_unit - line.offset
             };
             let rises = edges.iter().find(|edge| edge.level);
             let on = values.bit(line.home_switch);

@@ -224,6 +224,7 @@ fn a_stall_without_encoder_shows_at_the_next_homing() {
         home: 3.0,
         sequence: 0,
         use_index: false,
+        repeat: 2.0 / 400.0,
         travel: 100.0,
         velocity: 20.0,
         acceleration: 1000.0,

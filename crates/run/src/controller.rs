@@ -61,7 +61,7 @@ impl<'a> Controller<'a> {
 
     /// Homed, everything driven, at rest.
     pub(crate) fn is_done(&mut self) -> bool {
-        self.homing.is_none() && self.feeder.is_done()
+        self.homing.is_none() && self.simulation.missed_periods() == 0 && self.feeder.is_done()
     }
 
     /// One servo period.

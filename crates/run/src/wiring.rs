@@ -70,6 +70,7 @@ pub(crate) fn homing(machine: &Machine, to: Pose, substeps: u64, positions: &[f6
         home,
         sequence: joint.homing.sequence,
         use_index: joint.homing.index_pitch > 0.0,
+        repeat: 2.0 / joint.steps_per_unit,
         travel: (joint.range.max - joint.range.min) * (1.0 + 2.0 * OVERTRAVEL),
         velocity: joint.homing.search_velocity.abs(),
         acceleration: joint.max_acceleration,

@@ -120,3 +120,20 @@ fn an_unsafe_home_is_refused() {
         assert!(errors.iter().any(|error| error.message.contains(told)), "{set}: {errors:?}");
     }
 }
+
+#[test]
+fn a_switch_that_lies_once_is_found_out() {
+    common::on_each_case(true, |machine, rehearsal| {
+        for tick in (1..rehearsal.periods()).step_by(9) {
+            for kind in [
+                "+1,joint.1.home-sw-in,invert",
+                "+30,joint.0.home-sw-in,set=true",
+                ",home-switch.1.stuck-on,set=true",
+            ] {
+                common::outcome(machine, rehearsal, &[&format!("{tick}{kind}")]);
+            }
+        }
+        // its wire, not its place: that cannot be noticed, and is not among the random faults
+        assert!(rehearsal.pins().all(|pin| !(pin.starts_with("home-switch.") && pin.ends_with(".position"))));
+    });
+}

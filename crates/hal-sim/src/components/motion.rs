@@ -393,7 +393,8 @@ impl Motion {
             for (switch, name, _) in LIMIT_SWITCHES {
                 let on = values.bit(pins.limit_switches[switch]);
                 let leaves_s = &mut state.leaves_s[switch];
-                if on && (*leaves_s > 0.0 || enabled && !self.was_enabled) {
+                // on while the drives are off, or shortly before they went on
+                if on && (*leaves_s > 0.0 || !enabled || !self.was_enabled) {
                     *leaves_s = BOUNCE_S;
                 } else if on {
                     let pin = joint_pin(n, name);
@@ -491,6 +492,14 @@ impl Motion {
         let Some(setpoint) = setpoint else {
             if !self.rests {
                 return self.bridge(values, tick);
+            }
+            if tick.setpoint.is_some() {
+                // at rest nothing moves on, but someone should be there
+                self.missed += 1;
+                values.set_u32(self.overruns, values.u32(self.overruns).saturating_add(1));
+                if self.missed > MOST_MISSED {
+                    return Err(Fault::MissedPeriods { tick: tick.number, periods: self.missed });
+                }
             }
             for n in 0..self.joints.len() {
                 self.go(values, n, 0.0, 0.0);
