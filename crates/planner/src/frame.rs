@@ -239,7 +239,9 @@ impl Frame {
     }
 
     fn feed(&self, group: FeedGroup) -> Feed {
-        let per_second = if self.per_turn { self.spindle_speed.abs() / 60.0 } else { 1.0 / 60.0 };
+        // G95: of the commanded speed; under G96, which commands none here, of the last one.
+        let rpm = if self.surface_speed { self.spindle.speed_rpm } else { self.spindle_speed };
+        let per_second = if self.per_turn { rpm.abs() / 60.0 } else { 1.0 / 60.0 };
         let unit = match group {
             FeedGroup::Abc => radians(1.0),
             _ => self.unit_mm,
