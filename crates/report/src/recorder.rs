@@ -44,6 +44,7 @@ pub struct Recorder<'a> {
     pub(crate) peaks: Vec<Peak>,
     pub(crate) period_s: f64,
     rows: Fan<Sample>,
+    most_rows: usize,
     path: Path,
     before: [Joints; 2],
     curves: Vec<f64>,
@@ -89,6 +90,7 @@ impl<'a> Recorder<'a> {
             peaks,
             period_s: machine.servo_period_ns as f64 / 1e9,
             rows: Fan::new(TOLERANCE, MOST_BYTES / bytes),
+            most_rows: MOST_BYTES / bytes,
             path: Path::new(&axes),
             before: [joints; 2],
             curves: Vec::new(),
@@ -107,6 +109,14 @@ impl<'a> Recorder<'a> {
 
     /// A servo period.
     pub fn judged(&mut self, judged: &Judged) {
+        if judged.homing {
+            // Nothing is known of where the machine is: the curves stay empty, and the drawing begins behind it.
+            self.before = [judged.setpoint.joints; 2];
+            self.rows = Fan::new(TOLERANCE, self.most_rows);
+            self.curves.fill(f64::NAN);
+            self.envelope.push(&self.curves);
+            return;
+        }
         let mut sample = Sample::judged(self.machine, &self.axes, judged, &self.before, self.period_s);
         // A switch of the mechanism moves no joint.
         sample.jump = sample.joints == self.before[1] && sample.pose != self.pose;

@@ -21,4 +21,6 @@ pub struct Judged {
     pub deviation_mm: Option<f64>,
     /// Distance from a singularity: the smaller of both measures; `None` during a form switch.
     pub singularity: Option<f64>,
+    /// The machine homes: its joints are not where they say, and it has no pose yet.
+    pub homing: bool,
 }

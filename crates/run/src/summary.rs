@@ -212,6 +212,7 @@ impl<'a> Account<'a> {
             nearest: None,
             deviation_mm: None,
             singularity: None,
+            homing: true,
         }
     }
 
@@ -227,6 +228,7 @@ impl<'a> Account<'a> {
             nearest: None,
             deviation_mm: None,
             singularity: None,
+            homing: false,
         };
         let [before, last] = self.last;
         let mut moved = false;
