@@ -271,7 +271,8 @@ fn call(function: Function, x: f64) -> Result<f64, ErrorKind> {
         Function::Fup => maths::ceil(x),
         Function::Ln if x <= 0.0 => return Err(ErrorKind::MathLn { value: x }),
         Function::Ln => maths::log(x),
-        Function::Round => maths::round(x),
+        // Never -0: ATAN tells it from 0 (checked with rs274 2.9).
+        Function::Round => maths::round(x) + 0.0,
         Function::Sin => maths::sin(radians),
         Function::Sqrt if x < 0.0 => return Err(ErrorKind::MathSqrt { value: x }),
         Function::Sqrt => maths::sqrt(x),

@@ -11,7 +11,7 @@ use super::Interpreter;
 use super::saved::Saved;
 use crate::error::{Error, ErrorKind};
 use crate::expression;
-use crate::lexer::{Keyword, Rest, into_fault};
+use crate::lexer::{self, Keyword, Rest, into_fault};
 use crate::o_word::{self, Head, LabelText, push_integer};
 use crate::parameters::ARGUMENTS;
 use crate::settings::Dialect;
@@ -231,13 +231,26 @@ impl Interpreter {
         Ok(Some((value, code.len() - rest.len())))
     }
 
-    /// Behind an o-word only a comment may follow.
+    /// Behind an o-word only comments may follow. LinuxCNC does not look while it skips lines (checked with rs274 2.9).
     fn nothing_more(&self, at: usize) -> Result<(), Error> {
-        let code = self.line.code();
-        match code.get(at) {
-            None | Some(b'(') => Ok(()),
-            Some(_) => Err(self.flow_error(ErrorKind::OTrailing, self.line.code_span(at, code.len()))),
+        if self.flow.skip.is_some() && self.state.settings.dialect != Dialect::Pkm {
+            return Ok(());
         }
+        let end = self.line.code().len();
+        match self.behind_comments(at) {
+            at if at >= end => Ok(()),
+            at => Err(self.flow_error(ErrorKind::OTrailing, self.line.code_span(at, end))),
+        }
+    }
+
+    /// The offset behind the comments that stand at an offset.
+    fn behind_comments(&self, at: usize) -> usize {
+        let code = self.line.code();
+        let mut rest: Rest<'_> = code.get(at..).unwrap_or_default();
+        while let Ok((after, _)) = lexer::comment(rest) {
+            rest = after;
+        }
+        code.len() - rest.len()
     }
 
     /// An o-word line. `here` is the place of the line itself. The result is the state that M73 wants back.

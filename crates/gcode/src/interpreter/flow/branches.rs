@@ -58,9 +58,7 @@ impl Interpreter {
                 }
             }
             Keyword::Else => {
-                if pkm {
-                    self.nothing_more(word.operands)?;
-                }
+                self.nothing_more(word.operands)?;
                 self.known(word, &[Kind::If])?;
                 if self.flow.branch_taken {
                     self.flow.skip = skip;

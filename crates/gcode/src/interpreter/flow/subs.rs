@@ -107,7 +107,7 @@ impl Interpreter {
     pub(super) fn call(&mut self, word: &OWord, source: &mut dyn LineSource) -> Result<(), Error> {
         let mut arguments = [0.0; ARGUMENTS];
         let (mut at, mut count) = (word.operands, 0);
-        while let Some((value, next)) = self.operand(at)? {
+        while let Some((value, next)) = self.operand(self.behind_comments(at))? {
             let Some(argument) = arguments.get_mut(count) else {
                 let kind = ErrorKind::OArgs { limit: ARGUMENTS as u8 };
                 return Err(self.flow_error(kind, self.line.code_span(at, next)));
