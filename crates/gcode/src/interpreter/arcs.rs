@@ -76,13 +76,7 @@ impl State {
             let kind = ErrorKind::ArcWrongAxis { letter, plane: axes.name };
             return Err(block.word_error(axes.normal_centre, kind));
         }
-        let turns = match block.get(b'P') {
-            None => 1,
-            Some(p) if (p - maths::round(p)).abs() < 0.001 && (1.0..1e6).contains(&maths::round(p)) => {
-                maths::round(p) as i32
-            }
-            Some(value) => return Err(block.word_error(b'P', ErrorKind::ArcTurns { value })),
-        };
+        let turns = super::check::turns_of(block)?;
         let turns = if code == G2 { -turns } else { turns };
         self.check_feed(code, block)?;
         if self.cutter.arc_refused {

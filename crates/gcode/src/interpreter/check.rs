@@ -73,6 +73,20 @@ impl State {
         let io = block.m(MGroup::Io);
         let user = block.m(MGroup::User).is_some_and(|number| !self.settings.machine_codes.contains(number));
         let spindle = block.m(MGroup::Spindle);
+        if matches!(motion, G2 | G3) && block.has(b'P') {
+            turns_of(block)?;
+        }
+        if spindle == Some(19) {
+            // Before anything of the block is executed; Q only after the turn (checked with rs274 2.9).
+            let wrong = |letter: u8, value| {
+                Err(block.word_error(letter, ErrorKind::OrientRange { letter: letter.into(), value }))
+            };
+            match (block.get(b'R'), block.get(b'P')) {
+                (Some(angle), _) if !(0.0..=360.0).contains(&angle) => return wrong(b'R', angle),
+                (_, Some(way)) if ![0.0, 1.0, 2.0].contains(&way) => return wrong(b'P', way),
+                _ => {}
+            }
+        }
         let roughing = matches!(motion, 710..=712 | 720..=722);
         let lathe = roughing || motion == 700;
         let unused = |letter: u8, users: &'static str| {
@@ -169,6 +183,20 @@ impl State {
             return unused(b'$', "S M3 M4 M5 M19 M51 G33 G33.1 G74 G76 and G84");
         }
         Ok(())
+    }
+}
+
+/// P of an arc: how many turns, before anything of the block is executed (checked with rs274 2.9).
+pub(super) fn turns_of(block: &Block) -> Result<i32, Error> {
+    match block.get(b'P') {
+        None => Ok(1),
+        Some(p) => {
+            let turns = pkm_kins::maths::round(p);
+            if (p - turns).abs() < 0.001 && (1.0..1e6).contains(&turns) {
+                return Ok(turns as i32);
+            }
+            Err(block.word_error(b'P', ErrorKind::ArcTurns { value: p }))
+        }
     }
 }
 

@@ -123,25 +123,8 @@ impl State {
 
     /// M19 R P Q: orient to R degrees, P 0 shortest way 1 clockwise 2 counter-clockwise, wait at most Q seconds.
     fn orient(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
-        let wrong = |letter: u8, value| {
-            Err(block.word_error(letter, ErrorKind::OrientRange { letter: letter.into(), value }))
-        };
         let (angle, way, timeout) = (block.get(b'R'), block.get(b'P'), block.get(b'Q'));
-        if let Some(angle) = angle
-            && !(0.0..=360.0).contains(&angle)
-        {
-            return wrong(b'R', angle);
-        }
-        let mode = match way {
-            None => 0,
-            Some(way) if [0.0, 1.0, 2.0].contains(&way) => way as i32,
-            Some(way) => return wrong(b'P', way),
-        };
-        if let Some(timeout) = timeout
-            && timeout <= 0.0
-        {
-            return wrong(b'Q', timeout);
-        }
+        let mode = way.unwrap_or(0.0) as i32;
         if self.settings.dialect == Dialect::LinuxCnc29 {
             self.refuse_spindle_word(|n| n < 0.0, block)?;
         }
@@ -155,6 +138,10 @@ impl State {
                 });
             }
             if let Some(timeout) = timeout {
+                if timeout <= 0.0 {
+                    let kind = ErrorKind::OrientRange { letter: 'Q', value: timeout };
+                    return Err(block.word_error(b'Q', kind));
+                }
                 out.emit(Canon::WaitOrientComplete { spindle, timeout });
             }
         }
