@@ -9,8 +9,8 @@ use pkm_kins::maths::{degrees, fabs, radians};
 use pkm_kins::{Joints, MAX_JOINTS, Named, Pose, Slot};
 
 /// Geometry words looked at per call, and the most groups of them: a change is seen at the latest after so many calls.
-pub(crate) const GROUP: usize = 8;
-pub(crate) const MOST_GROUPS: usize = 8;
+pub(crate) const GROUP: usize = 2;
+pub(crate) const MOST_GROUPS: usize = 32;
 
 /// How far a joint may be moved by a change of geometry while LinuxCNC drives the machine, mm or degrees.
 const MOST_JUMP: f64 = 0.5;
