@@ -85,22 +85,39 @@ impl Row {
         let b = ax * kx + ay * self.ky;
         let n = ax * self.ky - ay * kx;
         let d = (self.link - n.abs()) * (self.link + n.abs());
-        let root = self.mode * d.max(0.0).sqrt();
+        let root = self.mode * (if d > 0.0 { d } else { 0.0 }).sqrt();
         let p = b + root;
         (n, root, (d >= self.edge) & (p >= self.low) & (p <= self.high))
     }
 }
 
-/// Multiplies det K of one mechanism into a row of poses; NaN where it cannot be.
-fn multiply_row(pair: &Pair, y: f64, x0: f64, step: f64, row: &mut [f64]) {
+/// Multiplies det K of one mechanism into a row of poses at `xs`; NaN where it cannot be. Where the processor has them, four
+/// lanes at a time instead of two: the same operations, none fused, hence the same bits.
+fn multiply_row(pair: &Pair, y: f64, xs: &[f64], row: &mut [f64]) {
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)] // twice as fast on every processor since 2013
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2, which is all that the function asks for.
+        unsafe { multiply_row_avx2(pair, y, xs, row) };
+        return;
+    }
+    multiply_row_plain(pair, y, xs, row);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn multiply_row_avx2(pair: &Pair, y: f64, xs: &[f64], row: &mut [f64]) {
+    multiply_row_plain(pair, y, xs, row);
+}
+
+#[inline(always)]
+fn multiply_row_plain(pair: &Pair, y: f64, xs: &[f64], row: &mut [f64]) {
     let [c1, c2] = &pair.chains;
     let (first, second) = (Row::new(c1, y), Row::new(c2, y));
     let (a1, a2) = (c1.direction, c2.direction);
     let (sine, cosine) = (a1[0] * a2[1] - a1[1] * a2[0], a1[0] * a2[0] + a1[1] * a2[1]);
     let least = -1e-9 * c1.link * c2.link;
-    for (k, value) in row.iter_mut().enumerate() {
-        // Below 2³² columns: the conversion is one instruction on every target.
-        let x = x0 + f64::from(k as u32) * step;
+    for (value, &x) in row.iter_mut().zip(xs) {
         let (n1, r1, ok1) = first.solve(x);
         let (n2, r2, ok2) = second.solve(x);
         // cross(L₁, L₂) from what is known along and off the guides; w₁ w₂ = r₁ r₂.
@@ -115,17 +132,18 @@ impl View {
     pub fn fill(&self, map: &mut Map, threads: usize) {
         let ([columns, _], step, [x0, y0]) = (map.size, map.step, map.origin);
         let walls: Vec<_> = self.reachable.walls().collect();
+        let xs: Vec<f64> = (0..columns).map(|k| x0 + k as f64 * step).collect();
         let rows_at_once = (16_384 / columns.max(1)).max(1);
         parallel::for_pieces(&mut map.determinant, columns * rows_at_once, threads, |piece, values| {
             for (k, row) in values.chunks_mut(columns).enumerate() {
                 let y = y0 + (piece * rows_at_once + k) as f64 * step;
                 row.fill(self.factor);
                 for pair in &self.mechanisms {
-                    multiply_row(pair, y, x0, step, row);
+                    multiply_row(pair, y, &xs, row);
                 }
                 for wall in &walls {
-                    for (column, value) in row.iter_mut().enumerate() {
-                        if !wall.holds([x0 + column as f64 * step, y]) {
+                    for (value, &x) in row.iter_mut().zip(&xs) {
+                        if !wall.holds([x, y]) {
                             *value = f64::NAN;
                         }
                     }
@@ -157,6 +175,13 @@ mod tests {
             view.fill(&mut map, 1);
             let mut again = map.clone();
             view.fill(&mut again, 3);
+            // With two lanes and with four.
+            let xs: Vec<f64> = (0..map.size[0]).map(|column| map.node(column, 0)[0]).collect();
+            let y = map.node(0, 40)[1];
+            let (mut two, mut four) = (vec![1.0; xs.len()], vec![1.0; xs.len()]);
+            multiply_row_plain(&view.mechanisms[0], y, &xs, &mut two);
+            multiply_row(&view.mechanisms[0], y, &xs, &mut four);
+            assert!(two.iter().zip(&four).all(|(a, b)| a.to_bits() == b.to_bits()));
             assert!(map.determinant.iter().zip(&again.determinant).all(|(a, b)| a.to_bits() == b.to_bits()));
             let ranges = machine.joint_ranges();
             let mechanism = match machine.mechanism {

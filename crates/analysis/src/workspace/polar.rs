@@ -14,6 +14,7 @@ use pkm_kins::machine::Mechanism;
 use pkm_kins::maths::{TAU, ceil, floor, hypot, radians, sincos};
 use pkm_kins::{Axis, JointRange, Kinematics, Lambda6, Lambda6Leg, Pose, Vec2};
 use pkm_machine::Machine;
+use std::cell::RefCell;
 
 /// How a scan steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -249,19 +250,20 @@ pub fn scan(machine: &Machine, kind: Kind, steps: Steps, threads: usize) -> Resu
     let most_steps = (radius / steps.d_rho_mm) as usize + 1;
     let scanned = parallel::map(planes, threads, |index| {
         let z_mm = (low + index as f64) * steps.dz_mm;
+        let test = Point { machine, ranges: ranges.clone() };
+        let plain = |[x, y]: Vec2| {
+            let can = |&[a, b, c]: &[f64; 3]| test.can(&Pose { x, y, z: z_mm, a, b, c, ..Pose::ZERO });
+            if kind.every { orientations.iter().all(can) } else { orientations.iter().any(can) }
+        };
         let radii_mm = match &machine.mechanism {
+            // Most planes are empty: their middle says so.
+            _ if !plain([0.0, 0.0]) => vec![0.0; steps.rays],
             Mechanism::Lambda6(lambda) if !lambda.has_cone() => {
-                let mut test = Annuli::new(lambda, &ranges, &orientations, z_mm, kind.every);
-                rays(&steps, most_steps, |p| test.can(p))
+                let rings = RefCell::new(Annuli::new(lambda, &ranges, &orientations, z_mm, kind.every));
+                let jump = |direction: Vec2| rings.borrow().first_failure(direction, steps.d_rho_mm);
+                rays(&steps, most_steps, jump, |p| rings.borrow_mut().can(p))
             }
-            _ => {
-                let test = Point { machine, ranges: ranges.clone() };
-                rays(&steps, most_steps, |[x, y]| {
-                    let can =
-                        |&[a, b, c]: &[f64; 3]| test.can(&Pose { x, y, z: z_mm, a, b, c, ..Pose::ZERO });
-                    if kind.every { orientations.iter().all(can) } else { orientations.iter().any(can) }
-                })
-            }
+            _ => rays(&steps, most_steps, |_| None, plain),
         };
         Plane { z_mm, radii_mm }
     });
@@ -273,15 +275,18 @@ pub fn scan(machine: &Machine, kind: Kind, steps: Steps, threads: usize) -> Resu
     Ok(Solid { kind, steps, planes })
 }
 
-/// The rays of one plane, each to its first failure.
-fn rays(steps: &Steps, most_steps: usize, mut can: impl FnMut(Vec2) -> bool) -> Vec<f64> {
-    if !can([0.0, 0.0]) {
-        return vec![0.0; steps.rays];
-    }
+/// The rays of one plane, each to its first failure. `jump` may know the number of the first step that fails.
+fn rays(
+    steps: &Steps,
+    most_steps: usize,
+    jump: impl Fn(Vec2) -> Option<usize>,
+    mut can: impl FnMut(Vec2) -> bool,
+) -> Vec<f64> {
     let mut ray = |m: usize| {
         let (s, c) = sincos(TAU * m as f64 / steps.rays as f64);
         let mut at = |rho: f64| can([rho * c, rho * s]);
-        let Some(fails) = (1..=most_steps).find(|&k| !at(k as f64 * steps.d_rho_mm)) else {
+        let first = jump([c, s]).filter(|&k| k <= most_steps);
+        let Some(fails) = first.or_else(|| (1..=most_steps).find(|&k| !at(k as f64 * steps.d_rho_mm))) else {
             return most_steps as f64 * steps.d_rho_mm;
         };
         let (mut pass, mut fail) = ((fails - 1) as f64 * steps.d_rho_mm, fails as f64 * steps.d_rho_mm);
@@ -370,6 +375,34 @@ impl Annuli {
             })
         });
         Self { rings: rings.collect(), every, last: 0 }
+    }
+
+    /// The number of the first step along a ray (unit vector) at which one orientation fails, if all are asked for, each leg
+    /// has one ring, and the middle can be taken: a ring is left for good through its outer circle, or entered through its inner.
+    fn first_failure(&self, direction: Vec2, step: f64) -> Option<usize> {
+        if !self.every {
+            return None;
+        }
+        let mut first = f64::INFINITY;
+        for ring in self.rings.iter().flatten() {
+            if ring.second[0] <= ring.second[1] {
+                return None;
+            }
+            // q(ρ) = ρ² − 2 m ρ + |centre|²
+            let m = direction[0] * ring.centre[0] + direction[1] * ring.centre[1];
+            let rest = m * m - ring.centre[0] * ring.centre[0] - ring.centre[1] * ring.centre[1];
+            let (inner, outer) = (rest + ring.first[0], rest + ring.first[1]);
+            first = first.min(floor((m + outer.sqrt()) / step) + 1.0);
+            if inner > 0.0 && m > 0.0 {
+                let root = inner.sqrt();
+                let enters = floor((m - root) / step) + 1.0;
+                // A hole between two steps is not seen.
+                if enters * step < m + root {
+                    first = first.min(enters);
+                }
+            }
+        }
+        (first >= 1.0 && first < 1e9).then_some(first as usize)
     }
 
     /// True if the orientations asked for can be taken at `p`.
