@@ -402,7 +402,7 @@ impl Annuli {
                 }
             }
         }
-        (first >= 1.0 && first < 1e9).then_some(first as usize)
+        (1.0..1e9).contains(&first).then_some(first as usize)
     }
 
     /// True if the orientations asked for can be taken at `p`.
