@@ -120,6 +120,12 @@ fn a_damaged_parameter_file_is_refused_by_name() {
         let run = pkm_with_input(&arguments, b"G0 X1\nM2\n");
         assert_eq!((run.status, run.stdout.as_str()), (2, ""));
         assert!(run.stderr.contains("param-file") && run.stderr.contains(place), "{}", run.stderr);
+        // The first save had nothing to keep: there is no .bak.
+        assert!(run.stderr.contains("there is no") && run.stderr.contains("pkm.var.bak"), "{}", run.stderr);
+        write(&folder.path().join("pkm.var.bak"), &whole);
+        let run = pkm_with_input(&arguments, b"G0 X1\nM2\n");
+        assert!(run.stderr.contains("before the last save is in"), "{}", run.stderr);
+        std::fs::remove_file(folder.path().join("pkm.var.bak")).unwrap();
         assert_eq!(std::fs::read(&file).unwrap(), text, "a refused file is left as it is");
     }
     assert_eq!(pkm(&["canon", "-", "--parameters", folder.path().to_str().unwrap()]).status, 2);

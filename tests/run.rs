@@ -238,6 +238,41 @@ fn bad_programs_are_refused_at_their_place() {
 }
 
 #[test]
+fn check_needs_no_machine() {
+    let text = b"#<size> = 5\no1 if [0]\n G99.5\no1 endif\nG0 X#<sise>\nM2\n";
+    let run = pkm_with_input(&["check", "-", "--format", "json"], text);
+    assert_eq!(run.status, 1);
+    let answer = run.json();
+    assert!(answer["machine"].is_null());
+    let found = answer["diagnostics"].as_array().unwrap();
+    let codes: Vec<_> =
+        found.iter().map(|d| (d["code"].as_str().unwrap(), d["line"].as_u64().unwrap())).collect();
+    assert_eq!(codes, [("g-unknown", 3), ("param-undefined", 5)]);
+    assert!(found[1]["help"].as_str().unwrap().contains("did you mean #<size>"), "{}", found[1]);
+    assert_eq!(pkm(&["check", &shipped("moma-arcs.ngc")]).status, 0);
+    assert_eq!(pkm(&["run", &shipped("moma-arcs.ngc")]).status, 2);
+}
+
+#[test]
+fn a_run_may_begin_at_a_line_and_an_endless_one_ends() {
+    let text = b"F500\nG1 X10\nG1 Y5\nG1 X3\nM2\n";
+    let run =
+        pkm_with_input(&["run", "-", "--machine", "xyz", "--start-line", "4", "--format", "json"], text);
+    let answer = run.json();
+    assert_eq!((run.status, &answer["completed"]), (0, &true.into()));
+    assert_eq!(
+        (answer["joints"][0]["max"].as_f64(), answer["joints"][1]["max"].as_f64()),
+        (Some(3.0), Some(0.0))
+    );
+    assert_eq!(answer["diagnostics"][0]["code"], "start-line");
+    let endless = b"G0 X1\n#1=1\no1 while [#1 gt 0]\n G0 X#1\no1 endwhile\nM2\n";
+    let run = pkm_with_input(&["check", "-", "--max-blocks", "100", "--format", "json"], endless);
+    let answer = run.json();
+    let found = &answer["diagnostics"][0];
+    assert_eq!((run.status, found["line"].as_u64()), (1, Some(3)), "{found}");
+}
+
+#[test]
 fn a_start_outside_the_workspace_is_refused() {
     let program = shipped("moma-arcs.ngc");
     let run = pkm(&["run", &program, "--machine", "moma-a", "--start", "X300 Y0", "--format", "json"]);

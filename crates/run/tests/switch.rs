@@ -224,3 +224,17 @@ fn a_form_switch_without_room_is_refused_with_its_line() {
     let found: Vec<(&str, u32)> = checked.diagnostics.iter().map(|d| (d.code.as_str(), d.line)).collect();
     assert_eq!(found, [("singular:form_switch", 1), ("not-checked", 1)]);
 }
+
+/// An error in the block of a switch does not mislead the check behind it: the switch counts as done, and the blocks behind it
+/// are judged on the mechanism it leads to.
+#[test]
+fn an_error_in_the_block_of_a_switch_does_not_mislead_the_check() {
+    let machine = load("hv-mill-6", &[]);
+    let right = "F500\nM429\nG0 U1\nM2\n";
+    assert_eq!(errors(right, &machine), []);
+    // Without the switch the axes of the other mechanism are locked.
+    let locked = errors("F500\nG0 U1\nM2\n", &machine);
+    assert_eq!(locked.iter().map(|(_, line)| *line).collect::<Vec<_>>(), [2], "{locked:?}");
+    let wrong = errors("F500\nM429 G0 Q3\nG0 U1\nM2\n", &machine);
+    assert_eq!(wrong, [("word-unused".to_owned(), 2)]);
+}

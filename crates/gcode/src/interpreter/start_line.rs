@@ -3,7 +3,7 @@
 
 use super::{Interpreter, Out, Phase, Status};
 use crate::error::{Error, ErrorKind};
-use crate::modal::{FeedMode, G0, G1, G33, GCode};
+use crate::modal::{FeedMode, G0, G1, G33, GCode, GGroup};
 use crate::source::{LineSource, Place};
 use crate::static_check::{Nesting, nesting_at};
 use pkm_canon::{Canon, CanonSink, FileId, Position, Span};
@@ -92,7 +92,11 @@ impl Interpreter {
     /// The first move after [`Interpreter::begin_elsewhere`].
     pub(super) fn check_approach(&mut self, motion: GCode) -> Result<(), Error> {
         self.approaches = false;
-        let kind = if self.state.modal.incremental {
+        let incremental = match self.block.g(GGroup::Distance) {
+            Some(code) => code == 910,
+            None => self.state.modal.incremental,
+        };
+        let kind = if incremental {
             ErrorKind::StartIncremental
         } else if matches!(motion, G0 | G1) || motion > G33 && motion != crate::modal::G33_1 {
             return Ok(());
