@@ -82,6 +82,8 @@ impl<S: CanonSink> CanonSink for SimulatedMachine<S> {
                 self.go(end);
             }
             Canon::StraightProbe { end, .. } => self.probe(end),
+            // rs274 takes the point behind the last one; mostly that is 0 (checked with rs274 2.9).
+            Canon::NurbsFeed { .. } => self.position[..2].fill(0.0),
             Canon::SetG5xOffset { offset, .. } => {
                 let new = offset.to_array();
                 self.shift(self.g5x, new);

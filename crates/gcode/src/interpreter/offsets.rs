@@ -136,11 +136,12 @@ impl State {
     fn offset_for_reading(&self, block: &Block, rotation_deg: f64, offset: &mut [f64; 9]) {
         let machine = self.machine_point(self.position);
         let without_tool: [f64; 9] = core::array::from_fn(|axis| machine[axis] - self.tool_offset[axis]);
+        let g92 = if self.settings.dialect == Dialect::Pkm { self.g92 } else { self.kept_g92() };
         let mut reading: [f64; 9] = core::array::from_fn(|axis| without_tool[axis] - offset[axis]);
         rotate(&mut reading, -rotation_deg);
         for (axis, reading) in reading.iter_mut().enumerate() {
             if let Some(value) = block.axis(axis) {
-                *reading = value + self.g92[axis];
+                *reading = value + g92[axis];
             }
         }
         rotate(&mut reading, rotation_deg);
@@ -202,6 +203,15 @@ impl State {
         }
         self.parameters.set_nine(first, &machine);
         Ok(())
+    }
+
+    /// G52 and G92 as the parameters have them: LinuxCNC's G10 looks there, also where a program has changed them since
+    /// (checked with rs274 2.9).
+    pub(crate) fn kept_g92(&self) -> [f64; 9] {
+        match self.parameters.get(parameters::G92_APPLIED) {
+            0.0 => [0.0; 9],
+            _ => self.program_units(self.parameters.nine(parameters::G92_OFFSET)),
+        }
     }
 
     fn store_g92(&mut self, applied: bool) {

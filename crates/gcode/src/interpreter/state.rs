@@ -79,10 +79,7 @@ impl State {
         let system = self.parameters.get(parameters::SYSTEM);
         self.modal.system = if (1.0..=9.0).contains(&system) { system as i32 } else { 1 };
         self.load_system(self.modal.system);
-        self.g92 = match self.parameters.get(parameters::G92_APPLIED) {
-            0.0 => [0.0; 9],
-            _ => self.program_units(self.parameters.nine(parameters::G92_OFFSET)),
-        };
+        self.g92 = self.kept_g92();
         // The machine that rs274 simulates knows no rotation.
         self.position = match self.settings.imitates_rs274 {
             true => core::array::from_fn(|axis| machine[axis] - self.g5x[axis] - self.g92[axis]),

@@ -244,14 +244,13 @@ impl State {
     fn tool_offset_for_reading(&self, l: i32, present: &[f64; 9], block: &Block) -> [Option<f64>; 9] {
         let number = if l == 10 { self.modal.system } else { 9 };
         let first = crate::parameters::system_offset(number);
-        let kept = |first| self.program_units(self.parameters.nine(first));
         let (system, rotation, g92) = if l == 10 && self.settings.dialect == Dialect::Pkm {
             (self.g5x, self.rotation_deg, self.g92)
         } else {
             // LinuxCNC takes the parameters, also where a program has changed them since (checked with rs274 2.9).
-            let applied = l == 10 && self.parameters.get(crate::parameters::G92_APPLIED) != 0.0;
-            let g92 = if applied { kept(crate::parameters::G92_OFFSET) } else { [0.0; 9] };
-            (kept(first), self.parameters.get(first + 9), g92)
+            let system = self.program_units(self.parameters.nine(first));
+            let g92 = if l == 10 { self.kept_g92() } else { [0.0; 9] };
+            (system, self.parameters.get(first + 9), g92)
         };
         let machine = self.machine_point(self.position);
         let mut reading: [f64; 9] = core::array::from_fn(|axis| machine[axis] - system[axis]);
