@@ -124,7 +124,7 @@ fn an_unsafe_home_is_refused() {
 #[test]
 fn a_switch_that_lies_once_is_found_out() {
     common::on_each_case(true, |machine, rehearsal| {
-        for tick in (1..rehearsal.periods()).step_by(9) {
+        for tick in (1..rehearsal.periods()).step_by(31) {
             for kind in [
                 "+1,joint.1.home-sw-in,invert",
                 "+30,joint.0.home-sw-in,set=true",

@@ -352,7 +352,8 @@ impl Motion {
             }
             for (switch, name, towards) in LIMIT_SWITCHES {
                 let leaves = state.leaves_s[switch] > 0.0 && values.bit(pins.limit_switches[switch]);
-                if leaves && travel * towards > 0.0 {
+                // standing on it is no way towards it, rounded as it may be
+                if leaves && travel * towards > ACCELERATION_SLACK.1 {
                     return Err(Fault::LimitSwitch { tick, pin: joint_pin(n, name) });
                 }
             }
