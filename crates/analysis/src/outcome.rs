@@ -46,6 +46,8 @@ pub enum End<'a> {
     Finished,
     /// It stopped in this servo period, and says why.
     Stopped(u64, &'a str),
+    /// It came to rest on the path in this servo period (an abort), and says why. The power may go off after it.
+    AtRest(u64, &'a str),
     /// It refused to begin, and says why.
     Refused(&'a str),
 }
@@ -122,6 +124,7 @@ pub fn judge(machine: &Machine, reference: &[Row], rows: &[Row], end: End<'_>) -
     match end {
         End::Finished => judge.finished().map(|()| Outcome::Equal),
         End::Stopped(tick, why) => told(why).and_then(|()| judge.stopped(tick)),
+        End::AtRest(tick, why) => told(why).and_then(|()| judge.at_rest(tick)),
         End::Refused(why) => told(why).and_then(|()| judge.still(0)).map(|()| Outcome::Refused),
     }
 }
@@ -326,10 +329,36 @@ impl Judge<'_> {
         (0..self.joints()).map(away).fold(0.0, f64::max)
     }
 
+    /// What a joint went in the period of a row.
+    fn travel(&self, i: usize, j: usize) -> f64 {
+        match i {
+            0 => 0.0,
+            _ if self.rows[i].zeroed => 0.0,
+            _ => self.rows[i].commanded[j] - self.rows[i - 1].commanded[j],
+        }
+    }
+
+    fn row_of(&self, tick: u64) -> usize {
+        self.rows.iter().position(|row| row.tick == tick).unwrap_or(0)
+    }
+
+    /// The machine stands on the path from the end of that period on, until its drives go off or for good.
+    fn at_rest(&self, tick: u64) -> Result<Outcome, Objection> {
+        let (told, end) = (self.row_of(tick), self.rows.len());
+        let off = (told..end).find(|i| !self.rows[*i].on).unwrap_or(end);
+        self.on_path(off)?;
+        for i in told + 1..off {
+            if let Some(j) = (0..self.joints()).find(|j| self.travel(i, *j).abs() > TINY) {
+                return self.object(i, format!("joint {} moves after it came to rest", self.name(j)));
+            }
+        }
+        self.still(end.saturating_sub(2))?;
+        Ok(if off < end { Outcome::Off } else { Outcome::AtRest })
+    }
+
     /// Everything that happened after the period in which the controller says that it stopped.
     fn stopped(&self, tick: u64) -> Result<Outcome, Objection> {
-        let end = self.rows.len();
-        let told = self.rows.iter().position(|row| row.tick == tick).unwrap_or(0);
+        let (told, end) = (self.row_of(tick), self.rows.len());
         self.still(end.saturating_sub(2))?;
         self.on_path(told)?;
         let Some(off) = (told..end).find(|i| !self.rows[*i].on) else {
@@ -340,24 +369,10 @@ impl Judge<'_> {
             return Ok(Outcome::Off);
         }
         // from the speeds in the period before, all joints lose the same share in each
-        let travel = |i: usize, j: usize| match i {
-            0 => 0.0,
-            _ if self.rows[i].zeroed => 0.0,
-            _ => self.rows[i].commanded[j] - self.rows[i - 1].commanded[j],
-        };
         let before = told.saturating_sub(1);
-        // The power went off a machine that an abort had brought to rest in that very period, within the limits.
-        let rests = (0..self.joints()).all(|j| {
-            let last = travel(told, j);
-            (told + 1..off).all(|i| travel(i, j).abs() <= TINY)
-                && last.abs().max((last - travel(before, j)).abs()) <= self.change(j) + TINY
-        });
-        if rests {
-            return Ok(Outcome::Off);
-        }
         // periods that the slowest to stop needs
         let slowest =
-            (0..self.joints()).map(|j| travel(before, j).abs() / self.change(j)).fold(0.0, f64::max);
+            (0..self.joints()).map(|j| self.travel(before, j).abs() / self.change(j)).fold(0.0, f64::max);
         if (off - told) as f64 > slowest + 3.0 {
             return self
                 .object(off, format!("it took {} periods to stop, {slowest:.1} are enough", off - told));
@@ -367,14 +382,14 @@ impl Judge<'_> {
             return Ok(Outcome::BrakedAndOff);
         }
         for j in 0..self.joints() {
-            let way: f64 = (told..off).map(|i| travel(i, j)).sum();
-            if way.abs() > 0.5 * travel(before, j).abs() * slowest + TINY {
+            let way: f64 = (told..off).map(|i| self.travel(i, j)).sum();
+            if way.abs() > 0.5 * self.travel(before, j).abs() * slowest + TINY {
                 return self.object(off, format!("joint {} braked over {way}", self.name(j)));
             }
             for i in told..off {
                 let share = 1.0 - (i - told + 1) as f64 / slowest.max(1e-9);
-                let expected = travel(before, j) * share.max(0.0);
-                if (travel(i, j) - expected).abs() > TINY {
+                let expected = self.travel(before, j) * share.max(0.0);
+                if (self.travel(i, j) - expected).abs() > TINY {
                     return self.object(i, format!("joint {} does not brake with the others", self.name(j)));
                 }
             }

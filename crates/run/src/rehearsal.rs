@@ -64,6 +64,18 @@ struct Session {
 struct Stop {
     tick: u64,
     message: String,
+    /// The program was aborted: the machine stands on the path.
+    at_rest: bool,
+}
+
+impl Stop {
+    fn end(&self) -> End<'_> {
+        if self.at_rest {
+            End::AtRest(self.tick, &self.message)
+        } else {
+            End::Stopped(self.tick, &self.message)
+        }
+    }
 }
 
 /// The machine as the judge sees it.
@@ -94,7 +106,7 @@ impl Session {
         let result = match &mut self.homing {
             Some(homing) => match self.simulation.home(homing, &mut []) {
                 Err(TickError::Source(error)) => {
-                    return Err(Stop { tick: tick - 1, message: error.to_string() });
+                    return Err(Stop { tick: tick - 1, message: error.to_string(), at_rest: false });
                 }
                 Err(TickError::Fault(fault)) => Err(fault),
                 Ok(_) => Ok(()),
@@ -119,9 +131,9 @@ impl Session {
         rows.push(row(&self.simulation, homing, offsets != self.simulation.home_offsets()));
         self.homing.take_if(|homing| homing.is_done());
         match result {
-            Err(fault) => Err(Stop { tick, message: fault.to_string() }),
+            Err(fault) => Err(Stop { tick, message: fault.to_string(), at_rest: false }),
             Ok(()) if !self.simulation.drives_on() => {
-                Err(Stop { tick, message: "emergency stop".to_owned() })
+                Err(Stop { tick, message: "emergency stop".to_owned(), at_rest: false })
             }
             Ok(()) => Ok(true),
         }
@@ -282,7 +294,7 @@ impl<'a> Rehearsal<'a> {
             }
             stop
         };
-        let end = stop.as_ref().map_or(End::Finished, |stop| End::Stopped(stop.tick, &stop.message));
+        let end = stop.as_ref().map_or(End::Finished, Stop::end);
         let verdict = judge(self.machine, &self.rows, &rows, end);
         let recovery = if stop.is_some() { self.recover(session) } else { Ok(()) };
         Ok(Played { message: stop.map_or_else(String::new, |stop| stop.message), verdict, recovery })
@@ -313,7 +325,11 @@ impl<'a> Rehearsal<'a> {
             }
             let (homing, offsets) = (controller.is_homing(), controller.simulation.home_offsets());
             if let Err(diagnostic) = controller.period(&mut []) {
-                stop = Some(Stop { tick: controller.simulation.tick_number(), message: diagnostic.message });
+                stop = Some(Stop {
+                    tick: controller.simulation.tick_number(),
+                    message: diagnostic.message,
+                    at_rest: false,
+                });
             }
             let zeroed = offsets != controller.simulation.home_offsets();
             rows.push(row(&controller.simulation, homing, zeroed));
@@ -323,8 +339,8 @@ impl<'a> Rehearsal<'a> {
         if stop.is_none()
             && let Some(failure) = controller.feeder.failure()
         {
-            // aborted: at rest on the path
-            stop = Some(Stop { tick: controller.simulation.tick_number(), message: failure.message.clone() });
+            let tick = controller.simulation.tick_number();
+            stop = Some(Stop { tick, message: failure.message.clone(), at_rest: true });
         }
         if stop.is_some() {
             session.stop(rows);

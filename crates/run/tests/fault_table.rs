@@ -330,6 +330,48 @@ fn the_judge_convicts() {
         };
         let said = ended(&steps_on, End::Stopped(at, "e-stop")).unwrap();
         assert!(said.contains("with its drive off"), "{said}");
+        // The first period that moves is the last: an abort may end like that, a braking machine may not.
+        let first = (1..good.len()).find(|&i| good[i].commanded != good[i - 1].commanded).unwrap();
+        let first_tick = good[first].tick;
+        let rests = |rows: &mut Vec<Row>, last: usize| {
+            rows.truncate(last + 1);
+            let stands = *rows.last().unwrap();
+            for n in 1..5 {
+                rows.push(Row { on: n < 3, tick: stands.tick + n, ..stands });
+            }
+        };
+        let abort = End::AtRest(first_tick, "aborted");
+        assert_eq!(ended(&|rows| rests(rows, first), abort), None);
+        let brakes = ended(&|rows| rests(rows, first), End::Stopped(first_tick, "switch")).unwrap();
+        assert!(brakes.contains("brake"), "{brakes}");
+        let coasts = |rows: &mut Vec<Row>| {
+            rows.truncate(first + 1);
+            let (last, stood) = (rows[first], rows[first - 1]);
+            let mut next = Row { tick: last.tick + 1, ..last };
+            for j in 0..machine.joints.len() {
+                let travel = last.commanded[j] - stood.commanded[j];
+                for values in [&mut next.commanded, &mut next.counted, &mut next.actual] {
+                    values[j] = last.commanded[j] + travel;
+                }
+            }
+            rows.push(next);
+            rests(rows, first + 1);
+        };
+        let moves = ended(&coasts, abort).unwrap();
+        assert!(moves.contains("moves after it came to rest"), "{moves}");
+        let aside = |rows: &mut Vec<Row>| {
+            let joint = &machine.joints[0];
+            let period_s = machine.servo_period_ns as f64 / 1e9;
+            let change = joint.max_acceleration * period_s * period_s;
+            let row = &mut rows[first];
+            let wrong = if row.commanded[0] > good[first - 1].commanded[0] { -0.9 } else { 0.9 };
+            for values in [&mut row.commanded, &mut row.counted, &mut row.actual] {
+                values[0] = good[first - 1].commanded[0] + wrong * change;
+            }
+            rests(rows, first);
+        };
+        let aside = ended(&aside, abort).unwrap();
+        assert!(aside.contains("off the path"), "{aside}");
         let moved = ended(&|_| {}, End::Refused("no")).unwrap();
         assert!(moved.contains("still moves"), "{moved}");
     });
