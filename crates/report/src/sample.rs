@@ -43,7 +43,8 @@ fn code(limit: Limited) -> u8 {
     match limit {
         Limited::Feed => 0,
         Limited::Corner => 1,
-        Limited::LookAhead => 2,
+        // The spindle is told apart by `pkm plan` alone.
+        Limited::LookAhead | Limited::Spindle => 2,
         Limited::Dwell => 3,
         Limited::Velocity { joint: j, corner } => joint(j, false, corner),
         Limited::Acceleration { joint: j, corner } => joint(j, true, corner),

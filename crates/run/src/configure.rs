@@ -2,7 +2,8 @@
 //!
 //! Every configuration is checked and planned by itself, on all cores; the answer does not depend on how many there are.
 
-use crate::{Options, Program, plan};
+use crate::plan::planned;
+use crate::{Options, Program};
 use pkm_analysis::parallel;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_kins::JointKind;
@@ -154,7 +155,7 @@ fn judge(
             return Ok(Judged { name, set, verdict: Verdict::NoMachine { code, message } });
         }
     };
-    let plan = plan(program, &machine, options)?;
+    let plan = planned(program, &machine, options, false)?;
     let first = plan.diagnostics.iter().find(|finding| finding.severity == Severity::Error);
     let verdict = match first {
         Some(finding) => Verdict::Fails {

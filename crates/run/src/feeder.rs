@@ -352,6 +352,11 @@ impl<'a> Feeder<'a> {
         &self.mechanism
     }
 
+    /// Stops for want of the next move that were not the program's.
+    pub(crate) fn starved_stops(&self) -> u64 {
+        self.planner.work().starved
+    }
+
     /// True during a form switch: no path is programmed then.
     pub(crate) fn is_switching(&self) -> bool {
         self.form_switch.is_some()
@@ -385,6 +390,11 @@ impl<'a> Feeder<'a> {
             && let Some(fault) = self.planner.fault().copied()
         {
             self.fail(messages::plan(self.program, self.machine, &fault));
+        }
+        // After an abort the program stands where the machine stands.
+        if self.aborted && self.planner.is_idle() && !self.is_elsewhere() {
+            self.frame.set_position(*self.planner.end());
+            self.interpreter.set_machine_position_mm(face(self.frame.position()));
         }
         self.conclude_probing();
         while self.planner.has_room() && !self.is_elsewhere() {
@@ -809,3 +819,7 @@ impl SetpointSource for Feeder<'_> {
         })
     }
 }
+
+#[cfg(test)]
+#[path = "feeder_tests.rs"]
+mod tests;

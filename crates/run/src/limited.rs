@@ -24,10 +24,12 @@ pub enum Limited {
     Acceleration { joint: usize, corner: bool },
     /// The feed, on a corner's blend.
     Corner,
+    /// The spindle, in step with it.
+    Spindle,
 }
 
 impl Limited {
-    /// In words: `feed`, `p1 velocity`, `corner: p1 acceleration`, `dwell`, `look-ahead`.
+    /// In words: `feed`, `p1 velocity`, `corner: p1 acceleration`, `dwell`, `look-ahead`, `spindle`.
     pub fn words(self, machine: &Machine) -> String {
         let name = |joint: usize| machine.joints.get(joint).map_or("?", |j| j.name.as_str());
         let at = |corner| if corner { "corner: " } else { "" };
@@ -36,8 +38,32 @@ impl Limited {
             Self::Corner => "corner: feed".to_owned(),
             Self::Dwell => "dwell".to_owned(),
             Self::LookAhead => "look-ahead".to_owned(),
+            Self::Spindle => "spindle".to_owned(),
             Self::Velocity { joint, corner } => format!("{}{} velocity", at(corner), name(joint)),
             Self::Acceleration { joint, corner } => format!("{}{} acceleration", at(corner), name(joint)),
+        }
+    }
+
+    /// The same limit, wherever it was met.
+    pub(crate) fn cause(self) -> Self {
+        match self {
+            Self::Corner => Self::Feed,
+            Self::Velocity { joint, .. } => Self::Velocity { joint, corner: false },
+            Self::Acceleration { joint, .. } => Self::Acceleration { joint, corner: false },
+            other => other,
+        }
+    }
+
+    /// As the subject of a sentence: `the programmed feed`, `p1's velocity`, `a dwell`, `stopping and starting`.
+    pub(crate) fn subject(self, machine: &Machine) -> String {
+        let name = |joint: usize| machine.joints.get(joint).map_or("?", |j| j.name.as_str());
+        match self {
+            Self::Feed | Self::Corner => "the programmed feed".to_owned(),
+            Self::Dwell => "a dwell".to_owned(),
+            Self::LookAhead => "stopping and starting".to_owned(),
+            Self::Spindle => "the spindle".to_owned(),
+            Self::Velocity { joint, .. } => format!("{}'s velocity", name(joint)),
+            Self::Acceleration { joint, .. } => format!("{}'s acceleration", name(joint)),
         }
     }
 }

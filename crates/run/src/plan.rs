@@ -2,11 +2,11 @@
 //!
 //! The program is planned and driven without the HAL. At every servo period the joints' velocities and accelerations
 //! (differences of the setpoints) and the feed are compared with their limits; the period is booked under the one
-//! that is used most.
+//! that is used most. What a period got less than the programmed feed is booked as lost.
 
 use crate::check::check;
 use crate::feeder::Feeder;
-use crate::limited::limited;
+use crate::limited::{Limited, limited};
 use crate::probing::Shadow;
 use crate::program::Program;
 use crate::{Options, messages};
@@ -31,6 +31,8 @@ pub struct BlockPlan {
     pub duration_s: f64,
     /// Seconds of it under each limit.
     pub limited_by_s: Shares,
+    /// Seconds of it lost against the programmed feed.
+    pub lost_s: f64,
 }
 
 /// What a program uses of one joint; mm or degrees.
@@ -55,18 +57,25 @@ pub struct Plan {
     pub machine: String,
     /// The whole program can run.
     pub completed: bool,
-    /// From the first motion to rest after the last, dwells included.
+    /// From the first motion or dwell to the end of the last.
     pub duration_s: f64,
     /// In program order of lines.
     pub blocks: Vec<BlockPlan>,
     /// Seconds of the whole program under each limit.
     pub limited_by_s: Shares,
-    /// The largest of them in words.
+    /// Seconds lost against the programmed feed, with its override, by the limit that took them. Rapids and dwells lose none.
+    pub lost_s: Shares,
+    /// The largest limit in words, and what 10 % more of it would save (planned again with it).
     pub verdict: String,
     /// What the motion uses of every joint, in joint order.
     pub joints: Vec<JointUse>,
     /// Smallest singularity measure on the way (a form switch does not count); 0 if nothing was driven.
     pub min_singularity_distance: f64,
+    /// Where time is lost, in words.
+    pub loss: String,
+    /// Stops, or all but, for want of the next block; left out when there were none.
+    #[serde(skip_serializing_if = "crate::summary::is_zero")]
+    pub starved_stops: u64,
     /// What a person should know.
     #[serde(skip)]
     pub diagnostics: Vec<Diagnostic>,
@@ -77,6 +86,16 @@ pub struct Plan {
 /// # Errors
 /// The program cannot be read.
 pub fn plan(program: &Program, machine: &Machine, options: &Options) -> Result<Plan, Diagnostic> {
+    planned(program, machine, options, true)
+}
+
+/// `tries`: the verdict says what 10 % more would save, which takes as long again.
+pub(crate) fn planned(
+    program: &Program,
+    machine: &Machine,
+    options: &Options,
+    tries: bool,
+) -> Result<Plan, Diagnostic> {
     let mut checked = check(program, machine, options)?;
     if let Some(span) = checked.probes.filter(|_| options.workpiece(machine).is_empty()) {
         checked.diagnostics.push(messages::probe_not_wired(program, span));
@@ -89,9 +108,12 @@ pub fn plan(program: &Program, machine: &Machine, options: &Options) -> Result<P
         duration_s: 0.0,
         blocks: Vec::new(),
         limited_by_s: Shares::new(),
+        lost_s: Shares::new(),
         verdict: "refused before anything moves".to_owned(),
         joints: Vec::new(),
         min_singularity_distance: 0.0,
+        loss: String::new(),
+        starved_stops: 0,
         diagnostics: checked.diagnostics,
     };
     if plan.diagnostics.iter().any(|d| d.severity == Severity::Error) {
@@ -100,44 +122,118 @@ pub fn plan(program: &Program, machine: &Machine, options: &Options) -> Result<P
     std::thread::scope(|scope| {
         let worker = std::thread::Builder::new()
             .stack_size(crate::STACK_BYTES)
-            .spawn_scoped(scope, || drive(program, machine, options, &mut plan))
+            .spawn_scoped(scope, || fill(program, machine, options, tries, &mut plan))
             .map_err(|e| messages::host(program, &format!("cannot start a thread: {e}")))?;
         worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })?;
     Ok(plan)
 }
 
-fn drive(program: &Program, machine: &Machine, options: &Options, plan: &mut Plan) -> Result<(), Diagnostic> {
+/// How much more of a limit the verdict tries.
+const MORE: f64 = 1.1;
+
+/// Seconds by limit, and lost.
+#[derive(Default)]
+struct Book {
+    spent_s: BTreeMap<Limited, f64>,
+    lost_s: BTreeMap<Limited, f64>,
+}
+
+/// A program driven without the HAL.
+struct Driven {
+    blocks: BTreeMap<u32, Book>,
+    duration_s: f64,
+    starved_stops: u64,
+    joints: Vec<JointUse>,
+    min_singularity_distance: f64,
+    /// Why it did not come to its end.
+    failure: Option<Diagnostic>,
+}
+
+impl Driven {
+    /// Over all blocks, each limit wherever it was met.
+    fn causes(&self, of: fn(&Book) -> &BTreeMap<Limited, f64>) -> BTreeMap<Limited, f64> {
+        let mut causes = BTreeMap::new();
+        for (limit, seconds) in self.blocks.values().flat_map(of) {
+            *causes.entry(limit.cause()).or_default() += seconds;
+        }
+        causes
+    }
+}
+
+fn fill(
+    program: &Program,
+    machine: &Machine,
+    options: &Options,
+    tries: bool,
+    plan: &mut Plan,
+) -> Result<(), Diagnostic> {
+    let driven = drive(program, machine, options)?;
+    plan.diagnostics.extend(driven.failure.clone());
+    plan.completed = driven.failure.is_none();
+    (plan.duration_s, plan.starved_stops) = (driven.duration_s, driven.starved_stops);
+    (plan.joints, plan.min_singularity_distance) = (driven.joints.clone(), driven.min_singularity_distance);
+    let mut longest_loss = (0.0, 0);
+    for (&line, book) in &driven.blocks {
+        let mut block = BlockPlan { line, duration_s: 0.0, limited_by_s: Shares::new(), lost_s: 0.0 };
+        for (limit, seconds) in &book.spent_s {
+            block.duration_s += seconds;
+            *block.limited_by_s.entry(limit.words(machine)).or_default() += seconds;
+            *plan.limited_by_s.entry(limit.words(machine)).or_default() += seconds;
+        }
+        for (limit, seconds) in &book.lost_s {
+            block.lost_s += seconds;
+            *plan.lost_s.entry(limit.words(machine)).or_default() += seconds;
+        }
+        if block.lost_s > longest_loss.0 {
+            longest_loss = (block.lost_s, line);
+        }
+        plan.blocks.push(block);
+    }
+    plan.verdict = verdict(program, machine, options, tries, &driven)?;
+    plan.loss = loss(machine, &driven, longest_loss);
+    Ok(())
+}
+
+fn drive(program: &Program, machine: &Machine, options: &Options) -> Result<Driven, Diagnostic> {
     let options = Options { substeps: 1, ..*options };
     let mut feeder = Feeder::new(program, machine, &options)?;
     let mut shadow = Shadow::new(machine, options.workpiece(machine));
     let period_s = machine.servo_period_ns as f64 / 1e9;
     let start = feeder.setpoint().joints;
     let mut before = [start; 2];
-    let mut blocks: BTreeMap<u32, Shares> = BTreeMap::new();
+    let mut blocks: BTreeMap<u32, Book> = BTreeMap::new();
     let (mut ticks, mut first, mut last) = (0_u64, None, 0);
     let (mut lowest, mut highest, mut nearest) = (start, start, f64::INFINITY);
+    let mut failure = None;
     while !feeder.is_done() {
         ticks += 1;
         if ticks > options.max_ticks {
-            plan.diagnostics.push(messages::max_ticks(program, options.max_ticks, feeder.line()));
-            return Ok(());
+            failure = Some(messages::max_ticks(program, options.max_ticks, feeder.line()));
+            break;
         }
         feeder.feedback(&shadow.feedback);
         let told = feeder.next(ticks).map_err(|e| *e.0)?;
         shadow.step(&told);
         let setpoint = *feeder.setpoint();
-        let moves = setpoint.joints != before[1];
+        let moves = setpoint.joints != before[1] || setpoint.state == pkm_planner::State::Dwell;
         if moves {
             first.get_or_insert(ticks - 1);
             last = ticks;
         }
-        if moves || setpoint.state == pkm_planner::State::Dwell || feeder.is_in_step() {
-            let words = match feeder.is_in_step() {
-                true => "spindle".to_owned(),
-                false => limited(machine, &setpoint, &before, period_s).0.words(machine),
+        let in_step = feeder.is_in_step();
+        if moves || in_step {
+            let limit = match in_step {
+                true => Limited::Spindle,
+                false => limited(machine, &setpoint, &before, period_s).0,
             };
-            *blocks.entry(setpoint.span.line).or_default().entry(words).or_default() += period_s;
+            let book = blocks.entry(setpoint.span.line).or_default();
+            *book.spent_s.entry(limit).or_default() += period_s;
+            // 0 on rapids
+            let lost = 1.0 - setpoint.feed_use / options.feed_override;
+            if setpoint.feed_use > 0.0 && lost > 0.0 && !in_step {
+                *book.lost_s.entry(limit).or_default() += lost * period_s;
+            }
         }
         before = [before[1], setpoint.joints];
         for ((low, high), q) in lowest.iter_mut().zip(&mut highest).zip(setpoint.joints) {
@@ -150,37 +246,144 @@ fn drive(program: &Program, machine: &Machine, options: &Options, plan: &mut Pla
         }
     }
     let ends = machine.joints.iter().zip(lowest.into_iter().zip(highest));
-    plan.joints = ends
+    let joints = ends
         .map(|(joint, (low, high))| JointUse {
             name: joint.name.clone(),
             min: joint.to_face(low),
             max: joint.to_face(high),
         })
         .collect();
-    plan.min_singularity_distance = if nearest.is_finite() { nearest } else { 0.0 };
-    plan.diagnostics.extend(feeder.failure().cloned());
-    plan.completed = feeder.failure().is_none();
-    plan.duration_s = (last - first.unwrap_or(last)) as f64 * period_s;
-    for (line, shares) in blocks {
-        for (limit, seconds) in &shares {
-            *plan.limited_by_s.entry(limit.clone()).or_default() += seconds;
-        }
-        plan.blocks.push(BlockPlan { line, duration_s: shares.values().sum(), limited_by_s: shares });
-    }
-    plan.verdict = verdict(&plan.limited_by_s);
-    Ok(())
+    Ok(Driven {
+        blocks,
+        duration_s: (last - first.unwrap_or(last)) as f64 * period_s,
+        starved_stops: feeder.starved_stops(),
+        joints,
+        min_singularity_distance: if nearest.is_finite() { nearest } else { 0.0 },
+        failure: failure.or_else(|| feeder.failure().cloned()),
+    })
 }
 
-fn verdict(shares: &Shares) -> String {
-    let total: f64 = shares.values().sum();
-    let most = shares.iter().fold(None, |most: Option<(&String, f64)>, (name, &seconds)| match most {
+/// The limit with the most time; of equals the first.
+fn most(causes: &BTreeMap<Limited, f64>) -> Option<(Limited, f64)> {
+    causes.iter().fold(None, |most: Option<(Limited, f64)>, (&limit, &seconds)| match most {
         Some((_, known)) if known >= seconds => most,
-        _ => Some((name, seconds)),
-    });
-    match most {
-        Some((name, seconds)) if total > 0.0 => {
-            format!("{name} limits {:.0} % of this program", 100.0 * seconds / total)
+        _ => Some((limit, seconds)),
+    })
+}
+
+/// What limits the most of the time, and what more of it would save.
+fn verdict(
+    program: &Program,
+    machine: &Machine,
+    options: &Options,
+    tries: bool,
+    driven: &Driven,
+) -> Result<String, Diagnostic> {
+    let causes = driven.causes(|book| &book.spent_s);
+    let total: f64 = causes.values().sum();
+    let Some((limit, seconds)) = most(&causes).filter(|_| total > 0.0) else {
+        return Ok("nothing moves".to_owned());
+    };
+    let share = 100.0 * seconds / total;
+    let text = match limit {
+        Limited::Dwell => format!("dwells take {share:.0} % of this program's time"),
+        _ => format!("{} limits {share:.0} % of this program's time", limit.subject(machine)),
+    };
+    let (mut stronger, mut faster) = (machine.clone(), *options);
+    match limit {
+        // the planner takes up to 200 %
+        Limited::Feed if options.feed_override * MORE <= 2.0 => faster.feed_override *= MORE,
+        Limited::Velocity { joint, .. } => stronger.joints[joint].max_velocity *= MORE,
+        Limited::Acceleration { joint, .. } => stronger.joints[joint].max_acceleration *= MORE,
+        _ => return Ok(text),
+    }
+    if !tries || driven.failure.is_some() {
+        return Ok(text);
+    }
+    let again = drive(program, &stronger, &faster)?;
+    let saved_s = driven.duration_s - again.duration_s;
+    Ok(match again.failure {
+        None if saved_s > 0.0 => {
+            let share = 100.0 * saved_s / driven.duration_s;
+            format!("{text}; 10 % more of it would save {saved_s:.3} s ({share:.1} %)")
         }
-        _ => "nothing moves".to_owned(),
+        None => format!("{text}; 10 % more of it would save nothing"),
+        Some(_) => text,
+    })
+}
+
+/// Where the program falls short of its feed: three limits and the worst block.
+fn loss(machine: &Machine, driven: &Driven, (block_s, line): (f64, u32)) -> String {
+    let mut causes: Vec<(Limited, f64)> =
+        driven.causes(|book| &book.lost_s).into_iter().filter(|(_, seconds)| *seconds >= 0.0005).collect();
+    causes.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let lost_s: f64 = causes.iter().map(|(_, seconds)| seconds).sum();
+    if causes.is_empty() {
+        return "no time is lost against the programmed feed".to_owned();
+    }
+    let named: Vec<String> = causes
+        .iter()
+        .take(3)
+        .map(|(limit, seconds)| match limit {
+            // nearly the feed: what is left to it is no limit's
+            Limited::Feed => format!("{seconds:.3} s just below the feed"),
+            _ => format!("{seconds:.3} s to {}", limit.subject(machine)),
+        })
+        .collect();
+    format!(
+        "{lost_s:.3} s are lost against the programmed feed: {}; most in line {line} ({block_s:.3} s)",
+        named.join(", ")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::on_a_large_stack;
+
+    fn of(machine: &Machine, text: &str) -> Plan {
+        let program = Program::Memory { name: "planned.ngc".to_owned(), text: text.as_bytes().to_vec() };
+        on_a_large_stack(|| plan(&program, machine, &Options::default()).unwrap())
+    }
+
+    #[test]
+    fn the_verdict_is_measured_and_the_books_balance() {
+        let machine = Machine::load("xyz", &[]).unwrap();
+        let text = "G21 G61\nG1 X30 F600000\nG0 X0\nG4 P0.1\nG1 Y20 F300\nM2\n";
+        // long enough at one limit of one joint
+        for text in [text, "G21 G61\nG1 X3 F600000\nM2\n", "G21 G61\nG1 X90 F600000\nM2\n"] {
+            let here = of(&machine, text);
+            assert!(here.completed, "{:?}", here.diagnostics);
+            let sum = |shares: &Shares| shares.values().sum::<f64>();
+            let blocks: f64 = here.blocks.iter().map(|block| block.duration_s).sum();
+            assert!((sum(&here.limited_by_s) - blocks).abs() < 1e-9);
+            // between blocks in G61 there may be a period at rest
+            assert!((here.duration_s - blocks).abs() < 0.004, "{} {blocks}", here.duration_s);
+            let (subject, rest) = here.verdict.split_once(" limits ").unwrap();
+            let saved: f64 =
+                rest.split_once("would save ").unwrap().1.split_once(" s").unwrap().0.parse().unwrap();
+            let mut stronger = machine.clone();
+            let mut options = Options::default();
+            match subject.split_once("'s ") {
+                None => options.feed_override = 1.1,
+                Some((name, what)) => {
+                    let joint = stronger.joints.iter_mut().find(|joint| joint.name == name).unwrap();
+                    match what {
+                        "velocity" => joint.max_velocity *= 1.1,
+                        "acceleration" => joint.max_acceleration *= 1.1,
+                        _ => panic!("{subject}"),
+                    }
+                }
+            }
+            let program = Program::Memory { name: String::new(), text: text.as_bytes().to_vec() };
+            let there = on_a_large_stack(|| plan(&program, &stronger, &options).unwrap());
+            assert!(saved > 0.0);
+            assert!((here.duration_s - there.duration_s - saved).abs() < 0.0006, "{}", here.verdict);
+            // X at 10 m/s takes nothing: all of its time is lost, of a slow Y hardly any, of a rapid none
+            let [fast, others @ ..] = here.blocks.as_slice() else { panic!() };
+            assert!((fast.duration_s - fast.lost_s).abs() < 0.012, "{fast:?}");
+            assert!(others.iter().all(|block| block.lost_s < 0.02), "{others:?}");
+            assert!(here.loss.contains(&format!("most in line 2 ({:.3} s)", fast.lost_s)), "{}", here.loss);
+        }
     }
 }

@@ -96,6 +96,9 @@ pub struct Summary {
     pub min_singularity_distance: f64,
     /// Where that was.
     pub closest_approach: ClosestApproach,
+    /// Stops, or all but, for want of the next block, which the program did not ask for; left out when there were none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub starved_stops: u64,
     /// Times shorter than the driver's data sheet allows.
     pub driver_timing_violations: u64,
     /// Steps moved later for the driver's sake, and the largest delay.
@@ -111,6 +114,10 @@ pub struct Summary {
     /// The parameters after a program that was completed.
     #[serde(skip)]
     pub parameters: Option<Box<Parameters>>,
+}
+
+pub(crate) fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 impl Summary {
@@ -143,6 +150,7 @@ impl Summary {
             max_edge_error_steps: 0.0,
             min_singularity_distance: 0.0,
             closest_approach: ClosestApproach { line: 0, joint: String::new() },
+            starved_stops: 0,
             driver_timing_violations: 0,
             delayed_steps: 0,
             max_step_delay_ns: 0,
@@ -324,6 +332,7 @@ impl<'a> Account<'a> {
                 line: self.closest.0,
                 joint: machine.joints.get(self.closest.1).map_or_else(String::new, |j| j.name.clone()),
             },
+            starved_stops: feeder.starved_stops(),
             driver_timing_violations: statistics.iter().map(|s| s.violations.total()).sum(),
             delayed_steps: statistics.iter().map(|s| s.delayed_steps).sum(),
             max_step_delay_ns: statistics.iter().map(|s| s.max_delay_ns).max().unwrap_or(0),

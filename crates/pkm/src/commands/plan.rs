@@ -38,24 +38,40 @@ fn plan(arguments: &Plan, messages: &Messages) -> Result<Outcome, Failure> {
         }
         Format::Text => {
             messages.print(&plan.diagnostics);
-            writeln!(
-                out,
-                "{} on {}: {:.3} s; {}",
-                plan.program, plan.machine, plan.duration_s, plan.verdict
-            )?;
+            writeln!(out, "{} on {}: {:.3} s", plan.program, plan.machine, plan.duration_s)?;
+            writeln!(out, "  {}", plan.verdict)?;
+            if !plan.loss.is_empty() {
+                writeln!(out, "  {}", plan.loss)?;
+            }
+            if plan.starved_stops > 0 {
+                writeln!(out, "  {} stops for want of the next block", plan.starved_stops)?;
+            }
             let total: f64 = plan.limited_by_s.values().sum();
-            let mut shares: Vec<(&String, &f64)> = plan.limited_by_s.iter().collect();
-            shares.sort_by(|a, b| b.1.total_cmp(a.1));
-            for (limit, seconds) in shares {
+            for (limit, seconds) in by_time(&plan.limited_by_s) {
                 writeln!(out, "  {:5.1} %  {seconds:9.3} s  {limit}", 100.0 * seconds / total)?;
             }
             let mut blocks: Vec<&pkm_run::BlockPlan> = plan.blocks.iter().collect();
             blocks.sort_by(|a, b| b.duration_s.total_cmp(&a.duration_s));
-            writeln!(out, "  the longest blocks:")?;
+            if !blocks.is_empty() && arguments.longest > 0 {
+                writeln!(out, "  the longest blocks, and what limits them:")?;
+            }
             for block in blocks.iter().take(arguments.longest) {
-                writeln!(out, "  line {:6}  {:9.3} s", block.line, block.duration_s)?;
+                let limits: Vec<String> = by_time(&block.limited_by_s)
+                    .into_iter()
+                    .take(3)
+                    .filter(|(_, seconds)| *seconds >= 0.005 * block.duration_s)
+                    .map(|(limit, seconds)| format!("{limit} {:.0} %", 100.0 * seconds / block.duration_s))
+                    .collect();
+                writeln!(out, "  line {:6}  {:9.3} s  {}", block.line, block.duration_s, limits.join(", "))?;
             }
         }
     }
     Ok(if plan.completed { Outcome::Clean } else { Outcome::No })
+}
+
+/// The largest first.
+fn by_time(shares: &pkm_run::Shares) -> Vec<(&String, f64)> {
+    let mut shares: Vec<(&String, f64)> = shares.iter().map(|(limit, seconds)| (limit, *seconds)).collect();
+    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    shares
 }

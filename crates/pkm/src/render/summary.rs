@@ -54,6 +54,9 @@ pub(crate) fn text(summary: &Summary) -> String {
             in_step.threads, in_step.taps, in_step.ticks_in_step, in_step.max_error_mm
         );
     }
+    if summary.starved_stops > 0 {
+        let _ = writeln!(text, "  {} stops for want of the next block", summary.starved_stops);
+    }
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
     table.set_header([
