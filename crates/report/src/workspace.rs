@@ -1,6 +1,7 @@
 //! The workspace behind the path: the exact outlines of `pkm-analysis`, put where the drawing has their plane.
 
 use pkm_analysis::workspace::outline;
+use pkm_analysis::workspace::polar::{Plane, Steps, ZERO_ORIENTATION, scan};
 use pkm_kins::{Mechanism, OxForm, Pose, Vec3};
 use pkm_machine::Machine;
 use serde::Serialize;
@@ -9,6 +10,9 @@ use crate::skeleton::hv_plane;
 
 /// Chords of the outlines are at most so far off, mm.
 const TOLERANCE_MM: f64 = 0.05;
+
+/// Spatial machines: a scan in planes so far apart, mm; its outline in each plane is drawn.
+const PLANES_MM: f64 = 50.0;
 
 /// One workspace.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,7 +26,7 @@ pub(crate) struct Space {
     pub loops: Vec<Vec<Vec3>>,
 }
 
-/// The workspaces of a machine; none where only a scan could tell.
+/// The workspaces of a machine: exact outlines; of a spatial one, what the polar scan finds with all angles 0.
 pub(crate) fn spaces(machine: &Machine, start: &Pose) -> Vec<Space> {
     let mut spaces = Vec::new();
     for (n, outline) in outline(machine, TOLERANCE_MM).into_iter().enumerate() {
@@ -47,6 +51,16 @@ pub(crate) fn spaces(machine: &Machine, start: &Pose) -> Vec<Space> {
                 add(0xff, false, &|point| hv_plane(m, Some(both), point));
             }
             _ => add(0xff, true, &|[x, y]| [x, y, 0.0]),
+        }
+    }
+    if spaces.is_empty() && !matches!(machine.mechanism, Mechanism::Cartesian(_)) {
+        let steps = Steps { dz_mm: PLANES_MM, ..Steps::default() };
+        // A scan that is refused (no travel to scan) leaves the page without one.
+        if let Ok(solid) = scan(machine, ZERO_ORIENTATION, steps, 1) {
+            let edge = |plane: &Plane| plane.points().iter().map(|&[x, y]| [x, y, plane.z_mm]).collect();
+            let loops = solid.planes.iter().filter(|plane| plane.area_mm2() > 0.0).map(edge).collect();
+            let name = "reachable with A, B and C at 0".to_owned();
+            spaces.push(Space { name, views: 0xff, filled: false, loops });
         }
     }
     spaces

@@ -103,8 +103,16 @@ fn every_shipped_machine_is_drawn_and_its_workspace_behind_it() {
         let kinds = |kind: &str| parts.iter().filter(|part| part["kind"] == kind).count();
         assert_eq!(kinds("tip"), drawing["paths"].as_array().unwrap().len(), "{name}");
         assert!(kinds("rail") >= 1 && kinds("slider") >= 1 && kinds("link") >= 1, "{name}");
-        let planar = !matches!(machine.mechanism, Mechanism::Cartesian(_) | Mechanism::Lambda6(_));
-        assert_eq!(!data["workspaces"].as_array().unwrap().is_empty(), planar, "{name}");
+        let spaces = data["workspaces"].as_array().unwrap();
+        assert_eq!(spaces.is_empty(), matches!(machine.mechanism, Mechanism::Cartesian(_)), "{name}");
+        if matches!(machine.mechanism, Mechanism::Lambda6(_)) {
+            // a loop in every plane of the scan, the home's height between the first and the last
+            let loops = spaces[0]["loops"].as_array().unwrap();
+            let height = |n: usize| loops[n][0][2].as_f64().unwrap();
+            assert!(
+                loops.len() > 5 && height(0) < machine.home.z && machine.home.z < height(loops.len() - 1)
+            );
+        }
     }
 }
 
