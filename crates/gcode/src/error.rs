@@ -246,7 +246,6 @@ errors! {
     // Tools and offsets.
     ToolUnknown { number: i32 } "tool-unknown" "tool {number} is not in the tool table" "add it to the tool table";
     ToolNotSelected "tool-missing" "M6, but no tool was selected" "select it with T first; T0 for none";
-    ToolMissing "tool-missing" "no tool table entry to change" "name a tool of the table with P";
     ToolTableFull { limit: u16 } "tool-table-full" "more than {limit} tools" "remove some";
     OffsetP { value: f64, first: i32, last: i32 } "offset-p" "G10 P{value}: P is a whole number from {first} to {last}" "name a coordinate system or a tool";
     OffsetL { value: f64 } "offset-l" "G10 L{value}" "L is 0, 1, 2, 10, 11 or 20";

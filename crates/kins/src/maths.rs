@@ -4,7 +4,7 @@
 
 pub use core::f64::consts::{PI, TAU};
 pub use libm::{
-    acos, asin, atan, atan2, ceil, cos, exp, floor, hypot, log, pow, round, sin, sincos, sqrt, tan,
+    acos, asin, atan, atan2, ceil, cos, exp, floor, hypot, log, pow, rint, round, sin, sincos, sqrt, tan,
 };
 
 /// |x|.

@@ -72,6 +72,8 @@ impl Checked {
             let told = self.diagnostics.iter_mut().find(same_line);
             match told.filter(|_| finding.severity == Severity::Error) {
                 None => self.add(program, finding),
+                // That its end is missing has nothing to do with what is wrong in its head.
+                Some(_) if finding.code == "o-unclosed" => self.add(program, finding),
                 // Why a loop does not end says more than that it has not ended.
                 Some(told) if finding.code == "endless-loop" => *told = finding,
                 Some(told) if told.code == finding.code => told.notes.extend(finding.notes),

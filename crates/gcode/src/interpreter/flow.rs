@@ -46,6 +46,7 @@ enum Style {
 /// A definition that was passed: the place behind its first line.
 #[derive(Debug, Clone, Copy)]
 struct Sub {
+    span: Span,
     line: Place,
     body: Place,
     style: Style,
@@ -143,13 +144,24 @@ impl Flow {
         self.pending.map(|(span, _)| Error { kind: ErrorKind::ONotFound, span })
     }
 
-    /// At the closing `%`: the call without a sub, or the construct without an end.
+    /// At the end of the program: the call without a sub, or the construct or sub whose end the lines passed over should
+    /// have held.
     pub(crate) fn unclosed(&self) -> Option<Error> {
-        let skip = self.skip?;
+        let sub = |label: Label| self.subs.get(&label).map(|sub| sub.span);
         self.unanswered().or_else(|| {
-            let open = self.constructs.get(&skip)?;
-            Some(Error { kind: ErrorKind::OUnclosed, span: open.span })
+            let span = match (self.skip, self.frames.last()) {
+                (Some(skip), _) if self.defining == Some(skip.label) => sub(skip.label),
+                (Some(skip), _) => self.constructs.get(&skip).map(|open| open.span),
+                (None, Some(frame)) if frame.style == Style::OWord => sub(frame.sub),
+                (None, _) => None,
+            };
+            Some(Error { kind: ErrorKind::OUnclosed, span: span? })
         })
+    }
+
+    /// True if an error in the o-word that should have ended what is passed over was told.
+    pub(crate) fn misses_a_wrong_end(&self) -> bool {
+        self.skip.is_some_and(|skip| self.wrong.contains(&skip.label))
     }
 }
 

@@ -43,6 +43,9 @@ pub(crate) fn is_predefined(name: &[u8]) -> bool {
     name == b"_current_tool" || state.predefined(name).is_some()
 }
 
+/// pkm's own dialect accepts it before the first block.
+pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// What a step left behind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
@@ -112,6 +115,7 @@ pub struct Interpreter {
     /// The block has been read and is being executed.
     executing: bool,
     /// The next move is the first after a start from a line.
+    #[cfg(feature = "std")]
     approaches: bool,
     /// Lines of the program before this one have been executed: what lies before it is executed again.
     furthest: u32,
@@ -134,6 +138,7 @@ impl Interpreter {
             idle_blocks: 0,
             blocks: 0,
             executing: false,
+            #[cfg(feature = "std")]
             approaches: false,
             furthest: 0,
             #[cfg(feature = "alloc")]
@@ -285,10 +290,10 @@ impl Interpreter {
         let place = source.place();
         let number = place.line + 1;
         match source.next_line() {
-            Ok(Some(mut text)) => {
-                if self.phase == Phase::Opening && number == 1 {
-                    text = self.without_byte_order_mark(text);
-                }
+            Ok(Some(text)) => {
+                let marked = self.phase == Phase::Opening && number == 1 && text.starts_with(BYTE_ORDER_MARK);
+                let refused = marked && self.state.settings.dialect != Dialect::Pkm;
+                let text = if marked && !refused { &text[BYTE_ORDER_MARK.len()..] } else { text };
                 let loaded = self.line.load(text, place.file, number);
                 let mut frame_begins = false;
                 if self.phase == Phase::Opening && !self.line.raw().is_empty() {
@@ -302,6 +307,10 @@ impl Interpreter {
                     return Ok(Status::Running);
                 }
                 loaded?;
+                if refused {
+                    let span = self.line.span(0, BYTE_ORDER_MARK.len());
+                    return Err(Error { kind: ErrorKind::ByteOrderMark, span });
+                }
             }
             Ok(None) => return Err(self.end_of_file()),
             Err(cause) => {
@@ -311,14 +320,6 @@ impl Interpreter {
             }
         }
         self.execute_line(place, source, sink)
-    }
-
-    /// pkm's own dialect accepts a byte order mark before the first block.
-    fn without_byte_order_mark<'a>(&self, text: &'a [u8]) -> &'a [u8] {
-        match self.state.settings.dialect {
-            Dialect::Pkm => text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text),
-            Dialect::LinuxCnc29 | Dialect::LinuxCnc210 => text,
-        }
     }
 
     fn end_of_file(&mut self) -> Error {
@@ -333,6 +334,11 @@ impl Interpreter {
             return error;
         }
         self.phase = Phase::Ended;
+        // What lacks its end has swallowed M2.
+        #[cfg(feature = "alloc")]
+        if let Some(error) = self.flow.unclosed() {
+            return error;
+        }
         let end = self.line.raw().len();
         Error { kind, span: self.line.span(end, end) }
     }

@@ -139,6 +139,7 @@ impl Interpreter {
             ErrorKind::ToolNotSelected => !recovery.tools.is_empty(),
             ErrorKind::ToolUnknown { number } => recovery.tools.contains(&number),
             ErrorKind::ONotFound => recovery.calls.contains(&error.span),
+            ErrorKind::OUnclosed => self.flow.misses_a_wrong_end(),
             ErrorKind::FileNoEnd | ErrorKind::FileNoEndPercent | ErrorKind::FileEmpty => false,
             _ if self.follows_o_word(error) => true,
             _ => self.recovery.mentions_unknown(self.line.code()),
@@ -174,7 +175,8 @@ impl Interpreter {
             }
             _ => {}
         }
-        if self.phase == Phase::Ended || self.is_skipping() && !self.is_branch() {
+        let reads_on = self.is_branch() || error.kind == ErrorKind::OTrailing;
+        if self.phase == Phase::Ended || self.is_skipping() && !reads_on {
             return;
         }
         let Ok(start) = self.line.skip_number() else { return };

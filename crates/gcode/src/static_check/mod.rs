@@ -10,6 +10,7 @@ mod quirks;
 use crate::advice::{self, Names, note, text};
 use crate::block::Block;
 use crate::error::{Error, ErrorKind};
+use crate::interpreter::BYTE_ORDER_MARK;
 use crate::line::Line;
 use crate::modal::{GGroup, MGroup};
 use crate::parameters::Parameters;
@@ -178,7 +179,7 @@ impl<'a> StaticCheck<'a> {
         while let Ok(Some(bytes)) = source.next_line() {
             number += 1;
             let bytes = match number {
-                1 if self.strict() => bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes),
+                1 if self.strict() => bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes),
                 _ => bytes,
             };
             let loaded = self.line.load(bytes, file, number);

@@ -162,7 +162,7 @@ impl Interpreter {
         if self.state.strict() && value != pkm_kins::maths::floor(value) {
             return Err(self.flow_error(ErrorKind::NotInteger { value }, word.span));
         }
-        Ok(value.round_ties_even() as i64)
+        Ok(pkm_kins::maths::rint(value) as i64)
     }
 
     /// Opens a construct, or opens it again at the same line.

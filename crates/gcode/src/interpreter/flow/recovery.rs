@@ -48,7 +48,7 @@ impl Interpreter {
                 return;
             }
             Keyword::Sub => {
-                let sub = Sub { line: here, body: source.place(), style: Style::OWord };
+                let sub = Sub { span, line: here, body: source.place(), style: Style::OWord };
                 self.flow.subs.entry(name.label).or_insert(sub);
                 self.flow.defining = Some(name.label);
                 self.flow.skip = Some(name);
@@ -61,6 +61,11 @@ impl Interpreter {
                 return;
             }
             Keyword::Call => return self.state.set_return_value(Some(0.0)),
+            Keyword::Endif | Keyword::Endwhile | Keyword::Endrepeat => {
+                // The end itself is right where only too much follows it; the loop is not run again.
+                self.flow.skip = None;
+                return self.flow.wrong.push(name.label);
+            }
             _ => return self.flow.wrong.push(name.label),
         };
         // Where the label was that of another construct, its end is now the end of this one.

@@ -13,7 +13,7 @@ use pkm_kins::maths;
 
 impl Interpreter {
     fn remember(&mut self, word: &OWord, line: Place, body: Place, style: Style) {
-        self.flow.subs.insert(word.name.label, Sub { line, body, style });
+        self.flow.subs.insert(word.name.label, Sub { span: word.span, line, body, style });
     }
 
     fn wrong_style(&self, style: Style) -> bool {
