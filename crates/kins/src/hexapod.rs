@@ -21,7 +21,7 @@
 use crate::attitude::Attitude;
 use crate::errors::{self, ForwardError, GeometryError, InverseError, Key};
 use crate::kinematics::{Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity};
-use crate::maths::{PI, TAU, cos, fabs, floor, sin, sqrt};
+use crate::maths::{PI, TAU, cos, fabs, floor, sin, sqrt, sqrt_2};
 use crate::pose::{Axis, AxisSet, Pose};
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub};
 
@@ -403,29 +403,182 @@ impl Kinematics for Hexapod {
         Ok(jacobian)
     }
 
-    /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈.
+    /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈. Two struts at a time, each with the operations of [`Self::struts`] in their order.
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
-        let (at, struts) = self.reach(pose)?;
+        Self::finite(pose)?;
+        let at = Attitude::of(pose);
         let (v, a) = (velocity, acceleration);
-        if !(v.is_finite() && a.is_finite()) {
-            return Err(InverseError::NotFinite);
-        }
         let (omega, alpha) = at.spin(v, a);
-        let mut motion = JointMotion { position: Self::lengths(&struts), ..JointMotion::default() };
-        let each = struts.iter().zip(motion.velocity.iter_mut()).zip(motion.acceleration.iter_mut());
-        for ((strut, rate), second) in each {
-            let turn = cross(omega, strut.arm);
-            let d_v = add([v.x, v.y, v.z], turn);
-            let d_a = add([a.x, a.y, a.z], add(cross(alpha, strut.arm), cross(omega, turn)));
-            *rate = dot(strut.unit, d_v);
-            *second = dot(strut.unit, d_a) + (dot(d_v, d_v) - *rate * *rate) / strut.length;
+        let mut motion = JointMotion::default();
+        let platform = self.platform.as_chunks().0.iter();
+        let lengths = motion.position.as_chunks_mut().0.iter_mut();
+        let rates = motion.velocity.as_chunks_mut().0.iter_mut();
+        let seconds = motion.acceleration.as_chunks_mut().0.iter_mut();
+        let struts = platform.zip(self.base.as_chunks().0).zip(lengths).zip(rates).zip(seconds);
+        for (((((points, bases), length), rate), second), joint) in struts.zip([0, 2, 4]) {
+            let arm = pair::rotate(&at, pair::of(points));
+            let d = pair::sub(pair::add(pair::both([pose.x, pose.y, pose.z]), arm), pair::of(bases));
+            *length = sqrt_2(pair::dot(d, d));
+            if !(length[0] > 1e-9) {
+                return Err(InverseError::ZeroStrut { joint });
+            }
+            if !(length[1] > 1e-9) {
+                return Err(InverseError::ZeroStrut { joint: joint + 1 });
+            }
+            let unit = pair::scale([1.0 / length[0], 1.0 / length[1]], d);
+            let turn = pair::cross(pair::both(omega), arm);
+            let d_v = pair::add(pair::both([v.x, v.y, v.z]), turn);
+            let bend = pair::add(pair::cross(pair::both(alpha), arm), pair::cross(pair::both(omega), turn));
+            let d_a = pair::add(pair::both([a.x, a.y, a.z]), bend);
+            *rate = pair::dot(unit, d_v);
+            let (along, square) = (pair::dot(unit, d_a), pair::dot(d_v, d_v));
+            let one = |i: usize| along[i] + (square[i] - rate[i] * rate[i]) / length[i];
+            *second = [one(0), one(1)];
         }
-        Ok(motion)
+        if v.is_finite() && a.is_finite() { Ok(motion) } else { Err(InverseError::NotFinite) }
     }
 
     fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
         let (_, struts) = self.reach(pose)?;
         let forward = reciprocal_condition(&self.scaled_rows(&struts));
         Ok(Singularity { inverse: 1.0, inverse_joint: 0, forward })
+    }
+}
+
+/// Vectors of two struts side by side, so that the processor can do both at once. Every function does with each of the two what
+/// its namesake in [`crate::vector`] does with one: the same bits.
+mod pair {
+    use crate::attitude::Attitude;
+    use crate::vector::Vec3;
+
+    type Two = [f64; 2];
+    /// Components, of both.
+    pub(super) type Pair = [Two; 3];
+
+    #[inline]
+    fn map(a: Two, b: Two, f: impl Fn(f64, f64) -> f64) -> Two {
+        [f(a[0], b[0]), f(a[1], b[1])]
+    }
+
+    #[inline]
+    fn plus(a: Two, b: Two) -> Two {
+        map(a, b, |a, b| a + b)
+    }
+
+    #[inline]
+    fn minus(a: Two, b: Two) -> Two {
+        map(a, b, |a, b| a - b)
+    }
+
+    #[inline]
+    fn times(a: Two, b: Two) -> Two {
+        map(a, b, |a, b| a * b)
+    }
+
+    #[inline]
+    pub(super) fn of([u, v]: &[Vec3; 2]) -> Pair {
+        [[u[0], v[0]], [u[1], v[1]], [u[2], v[2]]]
+    }
+
+    /// The same vector for both.
+    #[inline]
+    pub(super) fn both(v: Vec3) -> Pair {
+        v.map(|x| [x, x])
+    }
+
+    #[inline]
+    pub(super) fn add(u: Pair, v: Pair) -> Pair {
+        [plus(u[0], v[0]), plus(u[1], v[1]), plus(u[2], v[2])]
+    }
+
+    #[inline]
+    pub(super) fn sub(u: Pair, v: Pair) -> Pair {
+        [minus(u[0], v[0]), minus(u[1], v[1]), minus(u[2], v[2])]
+    }
+
+    #[inline]
+    pub(super) fn scale(k: Two, v: Pair) -> Pair {
+        [times(k, v[0]), times(k, v[1]), times(k, v[2])]
+    }
+
+    #[inline]
+    pub(super) fn dot(u: Pair, v: Pair) -> Two {
+        plus(plus(times(u[0], v[0]), times(u[1], v[1])), times(u[2], v[2]))
+    }
+
+    #[inline]
+    pub(super) fn cross(u: Pair, v: Pair) -> Pair {
+        let minor = |i: usize, j: usize| minus(times(u[i], v[j]), times(u[j], v[i]));
+        [minor(1, 2), minor(2, 0), minor(0, 1)]
+    }
+
+    /// As [`Attitude::rotate`].
+    #[inline]
+    pub(super) fn rotate(at: &Attitude, [bx, by, bz]: Pair) -> Pair {
+        let two = |(s, c): (f64, f64)| ([s, s], [c, c]);
+        let ((ss, cs), (st, ct), (sp, cp)) = (two(at.psi), two(at.theta), two(at.phi));
+        let (y, z) = (minus(times(cs, by), times(ss, bz)), plus(times(ss, by), times(cs, bz)));
+        let (x, height) = (plus(times(ct, bx), times(st, z)), minus(times(ct, z), times(st, bx)));
+        [minus(times(cp, x), times(sp, y)), plus(times(sp, x), times(cp, y)), height]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One strut at a time, without pairs.
+    fn plainly(hexapod: &Hexapod, pose: &Pose, v: &Pose, a: &Pose) -> JointMotion {
+        let (at, struts) = hexapod.reach(pose).unwrap();
+        let (omega, alpha) = at.spin(v, a);
+        let mut motion = JointMotion { position: Hexapod::lengths(&struts), ..JointMotion::default() };
+        for (i, strut) in struts.iter().enumerate() {
+            let turn = cross(omega, strut.arm);
+            let d_v = add([v.x, v.y, v.z], turn);
+            let d_a = add([a.x, a.y, a.z], add(cross(alpha, strut.arm), cross(omega, turn)));
+            let rate = dot(strut.unit, d_v);
+            motion.velocity[i] = rate;
+            motion.acceleration[i] = dot(strut.unit, d_a) + (dot(d_v, d_v) - rate * rate) / strut.length;
+        }
+        motion
+    }
+
+    #[test]
+    fn pairs_of_struts_have_the_bits_of_single_ones() {
+        let mut parameters = HexapodParameters::symmetric(400.0, 0.3, 150.0, 0.4, 500.0);
+        // platform points off their plane too
+        for (i, point) in parameters.platform_mm.iter_mut().enumerate() {
+            point[2] = 7.0 * i as f64 - 11.0;
+        }
+        let hexapod = Hexapod::new(&parameters).unwrap();
+        let mut state = 7_u64;
+        let mut unit = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        };
+        let mut pose = |mm: f64, rad: f64| {
+            let [x, y, z] = [unit(), unit(), unit()].map(|u| u * mm);
+            let [a, b, c] = [unit(), unit(), unit()].map(|u| u * rad);
+            Pose { x, y, z, a, b, c, ..Pose::ZERO }
+        };
+        for _ in 0..5000 {
+            let (mut place, v, a) = (pose(120.0, 0.6), pose(300.0, 2.0), pose(3000.0, 20.0));
+            place.z += 500.0;
+            let (pairs, plain) = (hexapod.motion(&place, &v, &a).unwrap(), plainly(&hexapod, &place, &v, &a));
+            let bits = |motion: &JointMotion| {
+                [motion.position, motion.velocity, motion.acceleration].map(|q| q.map(f64::to_bits))
+            };
+            assert_eq!(bits(&pairs), bits(&plain), "{place:?} {v:?} {a:?}");
+        }
+        // The errors name the strut: the platform's end of strut 3 (from 0) on its base.
+        let [p, b] = [parameters.platform_mm[3], parameters.base_mm[3]];
+        let at = Pose { x: b[0] - p[0], y: b[1] - p[1], z: b[2] - p[2], ..Pose::ZERO };
+        let error = hexapod.motion(&at, &Pose::ZERO, &Pose::ZERO).unwrap_err();
+        assert_eq!(error, InverseError::ZeroStrut { joint: 3 });
+        let fast = Pose { x: f64::NAN, ..Pose::ZERO };
+        assert_eq!(
+            hexapod.motion(&Pose { z: 500.0, ..at }, &fast, &at).unwrap_err(),
+            InverseError::NotFinite
+        );
     }
 }
