@@ -185,14 +185,6 @@ impl Hexapod {
         }
         Ok(rows)
     }
-
-    fn lengths(struts: &[Strut; 6]) -> Joints {
-        let mut joints = [0.0; MAX_JOINTS];
-        for (joint, strut) in joints.iter_mut().zip(struts) {
-            *joint = strut.length;
-        }
-        joints
-    }
 }
 
 impl TryFrom<HexapodParameters> for Hexapod {
@@ -531,8 +523,9 @@ mod tests {
     fn plainly(hexapod: &Hexapod, pose: &Pose, v: &Pose, a: &Pose) -> JointMotion {
         let (at, struts) = hexapod.reach(pose).unwrap();
         let (omega, alpha) = at.spin(v, a);
-        let mut motion = JointMotion { position: Hexapod::lengths(&struts), ..JointMotion::default() };
+        let mut motion = JointMotion::default();
         for (i, strut) in struts.iter().enumerate() {
+            motion.position[i] = strut.length;
             let turn = cross(omega, strut.arm);
             let d_v = add([v.x, v.y, v.z], turn);
             let d_a = add([a.x, a.y, a.z], add(cross(alpha, strut.arm), cross(omega, turn)));

@@ -163,7 +163,10 @@ pub struct Planner<K, const R: usize, const PIECES: usize, const NODES: usize> {
     pub(crate) nodes: Deque<Node<R>, NODES>,
     pub(crate) grid: Grid<R>,
     pub(crate) executor: Executor,
+    /// Where the path could not be cut any further.
     pub(crate) fault: Option<PlanError>,
+    /// Why a push was refused: nothing more is taken, what was taken is driven to its end.
+    pub(crate) refused: Option<PlanError>,
     pub(crate) setpoint: Setpoint,
     pub(crate) work: Work,
     /// The last move was released because the machine had to brake for want of the next.
@@ -191,6 +194,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             grid: Grid::new(),
             executor: Executor::new(),
             fault: None,
+            refused: None,
             setpoint: Setpoint {
                 pose: start,
                 joints,
@@ -232,7 +236,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// Why the queue stopped growing, if it did; the machine stops before that place.
     pub fn fault(&self) -> Option<&PlanError> {
-        self.fault.as_ref()
+        self.fault.as_ref().or(self.refused.as_ref())
     }
 
     /// True when a move can be pushed: there is room for it and for the nodes that a push may set.
@@ -247,7 +251,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     /// (looked at every millimetre or 0.02 rad, at most 64 times, before any of it is driven). Nothing more is taken
     /// then ([`Self::fault`]), and the machine comes to rest before that move.
     pub fn push(&mut self, next: Move) -> Result<u32, PushError> {
-        if let Some(fault) = self.fault {
+        if let Some(&fault) = self.fault() {
             return Err(PushError::Plan(fault));
         }
         if !self.has_room() {
@@ -274,7 +278,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             },
         );
         if let Some(error) = found {
-            self.fault = Some(error);
+            self.refused = Some(error);
             return Err(PushError::Plan(error));
         }
         self.work.starved += u64::from(core::mem::take(&mut self.starved));
@@ -425,7 +429,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.grid = Grid::new();
         self.grid.piece = self.first_piece;
         self.executor.rest();
-        self.fault = None;
+        (self.fault, self.refused) = (None, None);
         self.starved = false;
         self.end = self.setpoint.pose.to_array();
     }

@@ -156,7 +156,7 @@ fn a_whole_threading_cycle_runs() {
     // A taper's corner changes the speed along the path by a few percent; the tool needs a while for it.
     assert!(told.max_error_mm < 0.02 && summary.max_path_deviation_mm < 0.0225, "{summary:?}");
     let planned = plan(&program(text), &machine, &Options::default()).unwrap();
-    assert!(planned.completed && planned.verdict.starts_with("spindle limits"), "{}", planned.verdict);
+    assert!(planned.completed && planned.verdict.starts_with("the spindle limits"), "{}", planned.verdict);
     assert!(
         (planned.duration_s - summary.duration_s).abs() < 0.01,
         "{} {}",
