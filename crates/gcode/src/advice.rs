@@ -60,6 +60,11 @@ impl Interpreter {
             };
         }
         let mut diagnostic = diagnostic(error, self.source_line_of(error.span), source, program, &names);
+        if let (ErrorKind::FeedZero { .. } | ErrorKind::ProbeFeed, Some(span)) =
+            (error.kind, self.feed_unset())
+        {
+            diagnostic.notes.push(note("F was unset here", span, source, program));
+        }
         let calls = self.calls().filter(|call| *call != error.span);
         diagnostic.notes.extend(calls.map(|call| note("called from here", call, source, program)));
         diagnostic

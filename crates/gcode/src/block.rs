@@ -296,7 +296,14 @@ impl Block {
                 }
                 let group = reader.m_group(number);
                 let group = group.ok_or_else(|| fault(ErrorKind::MUnknown { number }, input, rest))?;
-                self.add_m(line, number, group, input, rest)?;
+                let both =
+                    reader.both_coolants && matches!((self.m(group), number), (Some(7), 8) | (Some(8), 7));
+                if both {
+                    self.m[group as usize] = MIST_AND_FLOOD;
+                    self.count_m(input, rest)?;
+                } else {
+                    self.add_m(line, number, group, input, rest)?;
+                }
                 Ok(rest)
             }
             b'n' | b'o' => Err(fault_here(ErrorKind::BadLetter { letter: upper.into() }, input)),
@@ -372,8 +379,14 @@ impl Block {
         from: Rest<'_>,
         to: Rest<'_>,
     ) -> Result<(), nom::Err<Fault>> {
-        let group =
-            GGroup::of(code).ok_or_else(|| fault(ErrorKind::GUnknown { code: Code(code) }, from, to))?;
+        let group = GGroup::of(code).ok_or_else(|| {
+            let kind = match code {
+                // LinuxCNC 2.10's second form of NURBS.
+                60..=63 => ErrorKind::GUnsupported { code: Code(code) },
+                _ => ErrorKind::GUnknown { code: Code(code) },
+            };
+            fault(kind, from, to)
+        })?;
         let slot = &mut self.g[group as usize];
         // G80 may share a block with another motion code and loses.
         if *slot >= 0 && code == G80 {
@@ -398,11 +411,16 @@ impl Block {
     ) -> Result<(), nom::Err<Fault>> {
         let slot = &mut self.m[group as usize];
         if *slot >= 0 {
-            let kind = ErrorKind::ModalClashM { first: (*slot).into(), second: number, group: group.name() };
+            let first = if *slot == MIST_AND_FLOOD { 7 } else { (*slot).into() };
+            let kind = ErrorKind::ModalClashM { first, second: number, group: group.name() };
             return Err(fault(kind, from, to));
         }
         *slot = number as i16;
         self.m_stretches[group as usize] = stretch(line, from, to);
+        self.count_m(from, to)
+    }
+
+    fn count_m(&mut self, from: Rest<'_>, to: Rest<'_>) -> Result<(), nom::Err<Fault>> {
         self.m_count += 1;
         if self.m_count > MAX_M {
             return Err(fault(ErrorKind::MTooMany { limit: MAX_M }, from, to));
@@ -474,6 +492,8 @@ pub(crate) struct Reader {
     pub(crate) diameter: bool,
     pub(crate) spindles: u8,
     pub(crate) machine_codes: MachineCodes,
+    /// M7 and M8 may share a block (pkm).
+    pub(crate) both_coolants: bool,
     /// The largest number of an axis word (promise P5).
     pub(crate) largest: f64,
 }

@@ -205,6 +205,7 @@ errors! {
     ArcAxisMissing { plane: &'static str } "arc-end-missing" "a radius arc needs an end word of the {plane} plane" "say where the arc ends";
     ArcZeroRadius { start: f64, end: f64 } "arc-zero-radius" "the arc's radius is 0 (at the start {start:.4}, at the end {end:.4})" "check the centre words";
     ArcRadiusMismatch { start: f64, end: f64, tolerance: f64 } "arc-radius-mismatch" "radius {start:.4} at the start, {end:.4} at the end; they may differ by {tolerance}" "check the end point and the centre words";
+    ArcSpiral { difference: f64 } "arc-spiral" "the arc is a spiral: its radius differs by {difference:.4} between start and end" "check the end point and the centre words";
     ArcPlane "arc-plane" "no arcs in the planes of U V W" "select G17, G18 or G19";
     ArcTurns { value: f64 } "arc-turns" "P{value} turns" "P is a whole number of turns, 1 or more";
     // Dwell, moves, polar words.

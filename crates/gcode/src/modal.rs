@@ -133,6 +133,9 @@ pub(crate) enum MGroup {
     Call,
 }
 
+/// M7 and M8 in one block, as the code of [`MGroup::Coolant`].
+pub(crate) const MIST_AND_FLOOD: i16 = 78;
+
 pub(crate) const M_GROUPS: usize = 8;
 
 impl MGroup {

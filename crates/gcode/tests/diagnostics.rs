@@ -62,7 +62,14 @@ fn said(files: &[(&str, &str)]) -> Vec<Diagnostic> {
     loop {
         match interpreter.step(&mut source, &mut Nothing) {
             Ok(Status::Ended) => return said,
-            Ok(_) => {}
+            Ok(_) => {
+                if let Some(notice) = interpreter.take_notice() {
+                    said.push(Diagnostic {
+                        severity: Severity::Note,
+                        ..interpreter.diagnose(&notice, &source, "program")
+                    });
+                }
+            }
             Err(error) => {
                 let new = interpreter.diagnose(&error, &source, "program");
                 let known = |d: &Diagnostic| (&d.file, d.line, &d.code) == (&new.file, new.line, &new.code);

@@ -199,6 +199,10 @@ fn interpret(
                 frame.set_position(inside(&interpreter.machine_position_mm()));
             }
         }
+        if let Some(notice) = interpreter.take_notice() {
+            let finding = interpreter.diagnose(&notice, &*source, &program.name());
+            checked.add(program, Diagnostic { severity: Severity::Note, ..finding });
+        }
         let switches = matches!(queue.front(), Some((Event::MachineCode(_), _)));
         checked.blocks += u64::from(stepped.is_ok());
         while let Some((event, span)) = queue.pop_front() {

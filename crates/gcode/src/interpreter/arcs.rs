@@ -109,7 +109,7 @@ impl State {
 
     /// I J K: the centre as offsets from the start (G91.1) or as coordinates (G90.1).
     fn centre_of_words(
-        &self,
+        &mut self,
         code: GCode,
         axes: PlaneAxes,
         from: Centre,
@@ -139,6 +139,11 @@ impl State {
         let relative = difference / start.max(end);
         if difference > 100.0 * tolerance || (difference > tolerance && relative > 0.001) {
             return Err(block.word_error(letter, ErrorKind::ArcRadiusMismatch { start, end, tolerance }));
+        }
+        let difference_mm = difference * self.modal.units.mm();
+        if difference_mm > self.largest_spiral_mm {
+            self.largest_spiral_mm = difference_mm;
+            self.notice = Some(block.word_error(letter, ErrorKind::ArcSpiral { difference }));
         }
         Ok(centre)
     }

@@ -5,6 +5,7 @@ use crate::block::{AXIS_LETTERS, Block};
 use crate::error::{Code, Error, ErrorKind};
 use crate::modal::*;
 use crate::settings::Dialect;
+use pkm_canon::Plane;
 
 /// Group-0 codes that take axis words.
 const fn takes_axes(code: GCode) -> bool {
@@ -15,9 +16,20 @@ impl State {
     /// Finds the block's motion and refuses words without use.
     pub(crate) fn complete(&self, block: &mut Block) -> Result<(), Error> {
         block.motion = self.motion_of(block)?;
+        self.check_polar(block)?;
         check_g_codes(block, self)?;
         check_m_codes(block, self.settings.dialect)?;
         self.check_words(block)
+    }
+
+    /// LinuxCNC looks at the plane in force before the block, whatever the block selects (checked with rs274 2.9); pkm at the
+    /// one in which the move is made.
+    fn check_polar(&self, block: &Block) -> Result<(), Error> {
+        if self.settings.dialect != Dialect::Pkm && block.has_polar() && self.modal.plane != Plane::Xy {
+            let letter = if block.has(b'@') { b'@' } else { b'^' };
+            return Err(block.word_error(letter, ErrorKind::PolarPlane));
+        }
+        Ok(())
     }
 
     /// RS274/NGC 3.5: axis words without a motion code repeat the modal motion.

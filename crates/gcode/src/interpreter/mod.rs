@@ -238,6 +238,18 @@ impl Interpreter {
         self.state.parameters.set(parameters::INPUT, value.unwrap_or(-1.0));
     }
 
+    /// What the last block does that its writer may not expect, a note and no error: an arc with a larger difference of its
+    /// radii than any before it.
+    pub fn take_notice(&mut self) -> Option<Error> {
+        self.state.notice.take()
+    }
+
+    /// The G94 or G95 that made F unset, as long as F was not set again.
+    #[cfg(feature = "std")]
+    pub(crate) fn feed_unset(&self) -> Option<Span> {
+        self.state.feed_unset
+    }
+
     /// True after M2, M30, M99, the closing `%` or the end of the file.
     pub fn has_ended(&self) -> bool {
         self.phase == Phase::Ended

@@ -72,6 +72,9 @@ impl State {
         let spindle = if per_turn { block.get(b'$').map_or(0, |n| n as i32) } else { 0 };
         out.emit(Canon::SetFeedMode { spindle, mode: per_turn.into() });
         if mode != FeedMode::InverseTime {
+            if self.modal.feed != 0.0 {
+                self.feed_unset = Some(block.g_span(GGroup::FeedMode));
+            }
             self.modal.feed = 0.0;
             out.emit(Canon::SetFeedRate(0.0));
         }
@@ -82,7 +85,7 @@ impl State {
         if let Some(feed) = block.get(b'F')
             && self.modal.feed_mode != FeedMode::InverseTime
         {
-            self.modal.feed = feed;
+            (self.modal.feed, self.feed_unset) = (feed, None);
             out.emit(Canon::SetFeedRate(feed));
         }
     }
@@ -150,21 +153,20 @@ impl State {
 
     /// M7, M8, M9.
     pub(crate) fn coolant(&mut self, block: &Block, out: &mut Out<'_>) {
-        match block.m(MGroup::Coolant) {
-            Some(7) => {
-                self.modal.mist = true;
-                out.emit(Canon::Mist(true));
-            }
-            Some(8) => {
-                self.modal.flood = true;
-                out.emit(Canon::Flood(true));
-            }
-            Some(_) => {
-                (self.modal.mist, self.modal.flood) = (false, false);
-                out.emit(Canon::Mist(false));
-                out.emit(Canon::Flood(false));
-            }
-            None => {}
+        let Some(code) = block.m(MGroup::Coolant) else { return };
+        let both = code == MIST_AND_FLOOD.into();
+        if code == 7 || both {
+            self.modal.mist = true;
+            out.emit(Canon::Mist(true));
+        }
+        if code == 8 || both {
+            self.modal.flood = true;
+            out.emit(Canon::Flood(true));
+        }
+        if code == 9 {
+            (self.modal.mist, self.modal.flood) = (false, false);
+            out.emit(Canon::Mist(false));
+            out.emit(Canon::Flood(false));
         }
     }
 

@@ -185,7 +185,7 @@ impl State {
 
     /// `@radius ^angle` from the program origin; one given keeps the other of the present point.
     fn polar_end(&self, block: &Block) -> Result<[f64; 2], Error> {
-        if self.modal.plane != Plane::Xy {
+        if self.modal.plane != Plane::Xy && self.settings.dialect == Dialect::Pkm {
             return Err(block.word_error(first_polar(block), ErrorKind::PolarPlane));
         }
         if let Some(letter) = b"XY".iter().copied().find(|letter| block.has(*letter)) {

@@ -12,13 +12,16 @@ use crate::modal::{FeedMode, Modal, Side};
 use crate::parameters::{self, Parameters, system_offset};
 use crate::settings::{Dialect, INCH_PER_MM, MM_PER_INCH, Settings};
 use crate::tool_table::ToolTable;
-use pkm_canon::{Canon, Direction, LengthUnit, Plane, Position};
+use pkm_canon::{Canon, Direction, LengthUnit, Plane, Position, Span};
 use pkm_kins::maths;
 
 /// True for the coordinates that are lengths (X Y Z U V W).
 pub(crate) const fn is_length(axis: usize) -> bool {
     axis < 3 || axis > 5
 }
+
+/// What an arc's radii may differ by without a word: as much as rounding its four numbers to 0.001 mm makes.
+const SMALLEST_SPIRAL_MM: f64 = 0.002;
 
 #[derive(Debug, Clone)]
 pub(crate) struct State {
@@ -46,6 +49,12 @@ pub(crate) struct State {
     pub(crate) unknown_names_are_zero: bool,
     /// Line of the block being read.
     pub(crate) source_line: u32,
+    /// The G94 or G95 that made F unset, until F is set.
+    pub(crate) feed_unset: Option<Span>,
+    /// See [`super::Interpreter::take_notice`].
+    pub(crate) notice: Option<Error>,
+    /// The largest difference of an arc's radii so far, mm.
+    pub(crate) largest_spiral_mm: f64,
 }
 
 impl State {
@@ -70,6 +79,9 @@ impl State {
             return_value: None,
             unknown_names_are_zero: false,
             source_line: 0,
+            feed_unset: None,
+            notice: None,
+            largest_spiral_mm: SMALLEST_SPIRAL_MM,
         }
     }
 
@@ -166,6 +178,7 @@ impl State {
             diameter: self.modal.diameter,
             spindles: self.settings.spindles.min(8),
             machine_codes: self.settings.machine_codes,
+            both_coolants: self.settings.dialect == Dialect::Pkm,
             largest: self.settings.largest_number(),
         }
     }
