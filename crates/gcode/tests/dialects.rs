@@ -14,7 +14,6 @@ fn canon(program: &str, settings: Settings) -> (String, Option<&'static str>) {
         refused = Some(error.kind.code());
         false
     });
-    drop(writer);
     (String::from_utf8(output).expect("text"), refused)
 }
 
