@@ -115,6 +115,25 @@ impl Block {
         self.get(AXIS_LETTERS[axis])
     }
 
+    /// This block without its settings, comments and codes; errors still find its motion code.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn bare(&self) -> Self {
+        let mut block = Self::new();
+        (block.words, block.present, block.stretches) = (self.words, self.present, self.stretches);
+        block.g[GGroup::Motion as usize] = self.g[GGroup::Motion as usize];
+        block.g_stretches = self.g_stretches;
+        (block.file, block.line, block.whole) = (self.file, self.line, self.whole);
+        block
+    }
+
+    /// Sets a word or takes it away; where it stands is where it stood.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn set(&mut self, letter: u8, value: Option<f64>) {
+        let bit = 1 << place(letter);
+        self.present = if value.is_some() { self.present | bit } else { self.present & !bit };
+        self.words[place(letter)] = value.unwrap_or(0.0);
+    }
+
     /// Rescales a word that is there (G7, G8 and units on the switching block).
     pub(crate) fn scale(&mut self, letter: u8, factor: f64) {
         self.words[place(letter)] *= factor;
@@ -310,6 +329,7 @@ impl Block {
             b'a'..=b'z' | b'$' | b'@' | b'^' => {
                 if let Some(axis) = AXIS_LETTERS.iter().position(|&l| l == upper)
                     && !reader.axes.contains(Axis::ALL[axis])
+                    && !(matches!(letter, b'u' | b'w') && matches!(self.g(GGroup::Motion), Some(700..=722)))
                 {
                     return Err(fault_here(ErrorKind::AxisUnavailable { letter: upper.into() }, input));
                 }

@@ -108,7 +108,7 @@ impl State {
     }
 
     /// I J K: the centre as offsets from the start (G91.1) or as coordinates (G90.1).
-    fn centre_of_words(
+    pub(super) fn centre_of_words(
         &mut self,
         code: GCode,
         axes: PlaneAxes,
@@ -150,7 +150,7 @@ impl State {
 
     /// R: positive the shorter arc, negative the longer one. The centre is on the perpendicular bisector of the
     /// chord, at the distance that the radius leaves.
-    fn centre_of_radius(
+    pub(super) fn centre_of_radius(
         &self,
         code: GCode,
         radius: f64,

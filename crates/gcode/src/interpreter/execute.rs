@@ -131,6 +131,10 @@ impl State {
                 out.emit(Canon::Comment("interpreter: motion mode set to none".into()));
                 self.modal.motion = G80;
             }
+            #[cfg(feature = "alloc")]
+            700 | 710..=712 | 720..=722 => self.check_lathe_cycle(code, block)?,
+            #[cfg(not(feature = "alloc"))]
+            700 | 710..=712 | 720..=722 => return Err(block.motion_error(ErrorKind::ONoMemory)),
             code if is_cycle(code) => self.cycle(code, block, out)?,
             code => return Err(block.motion_error(ErrorKind::GUnsupported { code: Code(code) })),
         }

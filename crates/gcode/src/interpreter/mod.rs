@@ -9,6 +9,10 @@ mod end;
 mod execute;
 #[cfg(feature = "alloc")]
 mod flow;
+#[cfg(feature = "alloc")]
+mod lathe_cycles;
+#[cfg(feature = "alloc")]
+mod lathe_profile;
 mod modes;
 mod motion;
 mod offsets;
@@ -123,6 +127,9 @@ pub struct Interpreter {
     flow: flow::Flow,
     #[cfg(feature = "alloc")]
     recovery: recovery::Recovery,
+    /// The lathe cycle whose profile is being read.
+    #[cfg(feature = "alloc")]
+    lathe: Option<alloc::boxed::Box<lathe_cycles::Profile>>,
 }
 
 impl Interpreter {
@@ -145,6 +152,8 @@ impl Interpreter {
             flow: flow::Flow::default(),
             #[cfg(feature = "alloc")]
             recovery: recovery::Recovery::default(),
+            #[cfg(feature = "alloc")]
+            lathe: None,
         }
     }
 
@@ -289,6 +298,10 @@ impl Interpreter {
         let here = source.place();
         let stepped = self.step_block(source, sink);
         #[cfg(feature = "alloc")]
+        if stepped.is_err() {
+            self.spoil_profile();
+        }
+        #[cfg(feature = "alloc")]
         let stepped = self.recover(stepped, here, source, sink);
         #[cfg(not(feature = "alloc"))]
         let _ = here;
@@ -423,7 +436,10 @@ impl Interpreter {
             let ended = self.phase == Phase::Ended;
             return Ok(if ended { Status::Ended } else { Status::Running });
         }
-        self.block.read(&self.line, start, &self.state, &self.state.reader())?;
+        let reader = self.state.reader();
+        #[cfg(feature = "alloc")]
+        let reader = self.profile_reader(reader);
+        self.block.read(&self.line, start, &self.state, &reader)?;
         self.state.complete(&mut self.block)?;
         #[cfg(feature = "std")]
         if let Some(motion) = self.block.motion.filter(|_| self.approaches) {
@@ -436,6 +452,11 @@ impl Interpreter {
         if let Some(status) = self.program_call(source, sink)? {
             return Ok(status);
         }
+        #[cfg(feature = "alloc")]
+        if self.lathe.is_some() {
+            self.take_profile_block()?;
+            return Ok(Status::Running);
+        }
         let mut out = Out { sink, span: self.block.span(), queue: &mut self.queue };
         self.executing = true;
         let status = self.state.execute(&mut self.block, &self.line, &mut out)?;
@@ -443,6 +464,11 @@ impl Interpreter {
             self.phase = Phase::Ended;
             let kind = ErrorKind::QueueFull { limit: queue::MAX_WAITING as u16 };
             return Err(Error { kind, span: self.block.span() });
+        }
+        #[cfg(feature = "alloc")]
+        if status != Status::Ended {
+            self.begin_profile(source)?;
+            return Ok(status);
         }
         if status == Status::Ended {
             self.phase = Phase::Ended;
@@ -465,6 +491,7 @@ impl Interpreter {
         if let Some(saved) = self.o_word(start, here, source)? {
             self.state.restore(&saved, span, &mut Out { sink, span, queue: &mut self.queue })?;
         }
+        self.end_profile(sink)?;
         Ok(Status::Running)
     }
 

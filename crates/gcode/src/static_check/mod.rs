@@ -268,12 +268,21 @@ impl<'a> StaticCheck<'a> {
             let span = self.block.m_span(MGroup::User);
             self.add(ErrorKind::MUnsupported { number }, span, Severity::Error);
         }
-        if let Some(code @ (700 | 710..=712 | 720..=722)) = self.block.g(GGroup::Motion)
-            && self.strict()
+        if let Some(700 | 710..=712 | 720..=722) = self.block.g(GGroup::Motion)
+            && self.block.has(b'Q')
         {
-            let span = self.block.g_span(GGroup::Motion);
-            self.add(ErrorKind::GUnsupported { code: crate::error::Code(code) }, span, Severity::Error);
+            let label = self.number_label(b'Q');
+            self.calls_sub(label, self.block.word_span(b'Q'));
         }
+    }
+
+    /// The label that a word's number names.
+    fn number_label(&self, letter: u8) -> Option<Vec<u8>> {
+        self.block.get(letter).filter(|number| !number.is_nan()).map(|number| {
+            let mut text = crate::o_word::LabelText::new();
+            crate::o_word::push_integer(&mut text, pkm_kins::maths::round(number) as i32);
+            text.to_vec()
+        })
     }
 
     /// M2, M30, M98, M99 and (abort,) of a block.
@@ -289,11 +298,7 @@ impl<'a> StaticCheck<'a> {
             _ => {}
         }
         if self.block.has_m(98) {
-            let label = self.block.get(b'P').filter(|p| !p.is_nan()).map(|p| {
-                let mut text = crate::o_word::LabelText::new();
-                crate::o_word::push_integer(&mut text, pkm_kins::maths::round(p) as i32);
-                text.to_vec()
-            });
+            let label = self.number_label(b'P');
             let span = self.block.m_span(MGroup::Call);
             self.calls_sub(label, span);
         }

@@ -276,6 +276,36 @@ impl Interpreter {
         Ok(true)
     }
 
+    /// Calls the sub that gives a lathe cycle its profile (Q); it must have been passed already. The result is how many
+    /// calls are open then.
+    pub(in crate::interpreter) fn call_profile(
+        &mut self,
+        source: &mut dyn LineSource,
+    ) -> Result<usize, Error> {
+        let number = maths::round(self.block.get(b'Q').unwrap_or(0.0)).clamp(-1e9, 1e9) as i32;
+        let mut text = LabelText::new();
+        push_integer(&mut text, number);
+        let label = self.flow.intern(&text);
+        self.flow.text = text;
+        if self.flow.subs.get(&label).is_none_or(|sub| sub.style != Style::OWord) {
+            return Err(self.block.word_error(b'Q', ErrorKind::LatheNoSub { number }));
+        }
+        let span = self.block.word_span(b'Q');
+        let arguments = Some([0.0; ARGUMENTS]);
+        self.enter(label, Style::OWord, span, 1, arguments, source)?;
+        Ok(self.flow.frames.len())
+    }
+
+    /// The o-word just executed is no part of what follows.
+    pub(in crate::interpreter) fn forget_o_word(&mut self) {
+        self.flow.current = None;
+    }
+
+    /// Open calls.
+    pub(in crate::interpreter) fn calls_open(&self) -> usize {
+        self.flow.frames.len()
+    }
+
     /// Executes M98 and M99 of the block just read. `None` if it has neither.
     pub(in crate::interpreter) fn program_call(
         &mut self,
