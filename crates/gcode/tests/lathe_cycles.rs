@@ -5,6 +5,7 @@ mod support;
 
 use pkm_canon::{Canon, CanonSink, Span};
 use pkm_gcode::{Interpreter, MemorySource, Settings, Status};
+use pkm_kins::maths;
 use support::generator::Random;
 
 type Point = [f64; 2];
@@ -38,7 +39,7 @@ impl CanonSink for Cuts {
 }
 
 fn distance(a: Point, b: Point) -> f64 {
-    (a[0] - b[0]).hypot(a[1] - b[1])
+    maths::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 fn line(from: Point, to: Point) -> Vec<Point> {
@@ -48,7 +49,7 @@ fn line(from: Point, to: Point) -> Vec<Point> {
 }
 
 fn arc(from: Point, to: Point, centre: Point, ccw: bool) -> Vec<Point> {
-    let angle = |p: Point| (p[1] - centre[1]).atan2(p[0] - centre[0]);
+    let angle = |p: Point| maths::atan2(p[1] - centre[1], p[0] - centre[0]);
     let radius = distance(from, centre);
     assert!((radius - distance(to, centre)).abs() < 1e-4, "{from:?} {to:?} {centre:?}");
     let turn = std::f64::consts::TAU;
@@ -58,7 +59,9 @@ fn arc(from: Point, to: Point, centre: Point, ccw: bool) -> Vec<Point> {
     }
     let steps = (radius * sweep.abs() / 0.05).ceil().max(1.0) as usize;
     let at = |i: usize| angle(from) + sweep * i as f64 / steps as f64;
-    (0..=steps).map(|i| [centre[0] + radius * at(i).cos(), centre[1] + radius * at(i).sin()]).collect()
+    (0..=steps)
+        .map(|i| [centre[0] + radius * maths::cos(at(i)), centre[1] + radius * maths::sin(at(i))])
+        .collect()
 }
 
 /// The moves of a program; the first error by its identifier and line.
