@@ -3,11 +3,11 @@
 //! Nothing is planned here: every programmed move is sampled closely along its whole length. All findings are
 //! reported (one a block and kind), not only the first.
 
-use crate::feeder::{
-    Events, HostLimits, face, frame, inside, interpreter, limits, settings, skip_to_line, tell_probe,
-};
 use crate::probing::contact;
 use crate::program::Program;
+use crate::setup::{
+    Events, HostLimits, face, frame, inside, interpreter, limits, settings, skip_to_line, tell_probe,
+};
 use crate::switch::switched;
 use crate::synchronised::judge;
 use crate::{Options, messages};

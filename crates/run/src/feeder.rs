@@ -5,158 +5,31 @@
 use crate::deviation::Programmed;
 use crate::probing::Probing;
 use crate::program::Program;
+use crate::setup::{
+    Events, HostLimits, HostPlanner, face, frame, interpreter, limits, skip_to_line, tell_probe,
+};
 use crate::switch::{FormSwitchDrive, switched};
 use crate::synchronised::{MOST_MOVES, SynchronisedDrive};
 use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
-use pkm_canon::{Canon, CanonSink, Probe, Span};
-use pkm_gcode::{Interpreter, LineSource, MachineCodes, Parameters, Settings, Status};
+use pkm_canon::{Probe, Span};
+use pkm_gcode::{Interpreter, LineSource, Parameters, Status};
 use pkm_hal_sim::{Feedback, Operator, Orient, Setpoint, SetpointSource, SpindleCommand, SpindleFeedback};
 use pkm_kins::machine::Mechanism;
-use pkm_kins::{Joints, Kinematics, Pose, maths};
+use pkm_kins::{Joints, Kinematics, Pose};
 use pkm_machine::{Machine, Switched};
-use pkm_planner::path::{FeedGroup, Geometry, Tolerance, Vector, feed_length};
+use pkm_planner::path::{FeedGroup, Geometry, feed_length};
 use pkm_planner::{
-    AxisLimits, Chords, Event, Feed, Frame, JointLimits, Limits, Merger, Move, PathMode, Planner, PushError,
-    Smoother, SpindleOrder, State, SynchronisedMove,
+    Chords, Event, Feed, Frame, Merger, Move, PathMode, PushError, Smoother, SpindleOrder, State,
+    SynchronisedMove,
 };
 use std::collections::VecDeque;
 use std::fmt;
 
-/// Pieces and nodes for a look-ahead of thousands of short blocks.
-type HostPlanner = Planner<Mechanism, ROWS, 2048, 2048>;
-
-/// Joints and limited axes of any machine here.
-const ROWS: usize = 12;
-pub(crate) type HostLimits = Limits<ROWS>;
+mod in_step;
 
 /// Setpoints a smoother can average: its longest window with ten rows between the servo ticks.
 const SMOOTHER: usize = 640;
-
-/// Tolerance of a blend in rotary coordinates, rad (0.01°): G64 P speaks of lengths.
-const BLEND_RAD: f64 = 0.01 / 180.0 * maths::PI;
-
-/// What the interpreter needs to know of a machine; all axes and no codes of its own without one.
-pub(crate) fn settings(machine: Option<&Machine>, options: &Options) -> Settings {
-    let common = Settings {
-        block_delete: options.block_delete,
-        max_blocks: options.max_blocks,
-        max_idle_blocks: options.max_blocks,
-        ..Settings::default()
-    };
-    let Some(machine) = machine else { return common };
-    let codes: Vec<i32> = machine.switches.iter().map(|switch| switch.code).collect();
-    Settings {
-        // A machine has no more codes than the interpreter takes.
-        machine_codes: MachineCodes::new(&codes).unwrap_or_default(),
-        axes: machine.mechanism.axes(),
-        ..common
-    }
-}
-
-/// An interpreter with tools and parameters as the caller gave them.
-pub(crate) fn prepared(settings: Settings, options: &Options) -> Interpreter {
-    let mut interpreter = Interpreter::new(settings);
-    if let Some(tools) = options.tools {
-        interpreter.tools_mut().clone_from(tools);
-    }
-    if let Some(parameters) = options.parameters {
-        interpreter.parameters_mut().clone_from(parameters);
-    }
-    interpreter
-}
-
-/// The interpreter of a machine that stands at `start`.
-pub(crate) fn interpreter(machine: &Machine, options: &Options, start: &Pose) -> Interpreter {
-    let mut interpreter = prepared(settings(Some(machine), options), options);
-    interpreter.set_machine_position_mm(face(&start.to_array()));
-    interpreter
-}
-
-/// Goes to the line that the options ask for; the machine stays where it stands.
-pub(crate) fn skip_to_line(
-    interpreter: &mut Interpreter,
-    program: &Program,
-    source: &mut dyn LineSource,
-    options: &Options,
-    start: &Pose,
-    sink: &mut dyn CanonSink,
-) -> Result<(), Diagnostic> {
-    let Some(line) = options.start_line else { return Ok(()) };
-    interpreter
-        .skip_to_line(line, source, sink)
-        .map_err(|error| interpreter.diagnose(&error, source, &program.name()))?;
-    interpreter.begin_elsewhere(face(&start.to_array()));
-    Ok(())
-}
-
-/// mm and degrees.
-pub(crate) fn face(pose: &Vector) -> pkm_canon::Position {
-    let mut v = *pose;
-    for angle in &mut v[3..6] {
-        *angle = maths::degrees(*angle);
-    }
-    pkm_canon::Position::from_array(v)
-}
-
-/// mm and rad.
-pub(crate) fn inside(position: &pkm_canon::Position) -> Vector {
-    let mut v = position.to_array();
-    for angle in &mut v[3..6] {
-        *angle = maths::radians(*angle);
-    }
-    v
-}
-
-/// The frame a program starts in.
-pub(crate) fn frame(machine: &Machine, start: &Pose) -> Frame {
-    let tolerance = Tolerance { length_mm: machine.path.blend_tolerance, angle_rad: BLEND_RAD };
-    Frame::new(start.to_array(), tolerance)
-}
-
-/// What the joints and axes of a machine may do.
-pub(crate) fn limits(program: &Program, machine: &Machine) -> Result<HostLimits, Diagnostic> {
-    let joints: Vec<JointLimits> = machine
-        .joints
-        .iter()
-        .map(|joint| JointLimits {
-            range: joint.range,
-            max_velocity: joint.max_velocity,
-            max_acceleration: joint.max_acceleration,
-        })
-        .collect();
-    let axes: Vec<AxisLimits> = machine
-        .axes
-        .iter()
-        .map(|limits| AxisLimits {
-            axis: limits.axis,
-            range: limits.range,
-            max_velocity: limits.max_velocity.unwrap_or(f64::INFINITY),
-            max_acceleration: limits.max_acceleration.unwrap_or(f64::INFINITY),
-        })
-        .collect();
-    Limits::new(&joints, &axes, machine.singularity.guard)
-        .map_err(|e| messages::host(program, &format!("the machine's limits cannot be planned with: {e:?}")))
-}
-
-/// Collects the events of one block.
-pub(crate) struct Events<'a> {
-    pub(crate) frame: &'a mut Frame,
-    pub(crate) queue: &'a mut VecDeque<(Event, Span)>,
-}
-
-impl CanonSink for Events<'_> {
-    fn command(&mut self, command: &Canon<'_>, span: Span) {
-        self.frame.apply(command, span, |event| self.queue.push_back((event, span)));
-    }
-}
-
-/// Tells the interpreter where the probe answered: machine coordinates, mm and rad.
-pub(crate) fn tell_probe(interpreter: &mut Interpreter, at: &Pose, tripped: bool) {
-    interpreter.set_machine_position_mm(face(&at.to_array()));
-    let point = interpreter.position();
-    interpreter.set_probe_result(point, tripped);
-}
 
 /// Why there is no setpoint.
 #[derive(Debug)]
@@ -501,127 +374,6 @@ impl<'a> Feeder<'a> {
                 self.probing = Some(Probing { probe, span, tripped: None });
                 Ok(())
             }
-        }
-    }
-
-    /// What follows does not belong to the chain.
-    fn close_chain(&mut self) {
-        self.planner.finish();
-        self.pending = Some(Pending::Chain(std::mem::take(&mut self.chain), None));
-    }
-
-    fn begin_chain(
-        &mut self,
-        mut moves: Vec<SynchronisedMove>,
-        retract_scale: Option<f64>,
-    ) -> Result<(), Diagnostic> {
-        if let Some((_, last)) = self.orders.drain(..).next_back() {
-            self.spindle = last;
-        }
-        for step in &mut moves {
-            // A move of no length is only counted by the planner; its number is the chain's.
-            let still = Move {
-                geometry: Geometry::Hold(step.geometry.at(0.0).position),
-                feed: Feed { speed: f64::INFINITY, group: FeedGroup::Xyz },
-                rapid: true,
-                mode: PathMode::ExactStop,
-                span: step.span,
-            };
-            step.motion = self.planner.push(still).map_err(|error| self.refused(&error))?;
-            self.moves = step.motion.wrapping_add(1);
-            self.path_length_mm += step.geometry.length();
-            self.programmed.push(step.motion, step.geometry, &[]);
-        }
-        self.in_step = Some(SynchronisedDrive::new(
-            self.program,
-            self.machine,
-            &self.limits,
-            &self.mechanism,
-            &moves,
-            retract_scale,
-            (self.spindle, self.substeps),
-        )?);
-        Ok(())
-    }
-
-    /// A chain is over: the planner goes on from its end.
-    fn end_chain(&mut self) -> Result<(), Diagnostic> {
-        let Some(drive) = self.in_step.take_if(|drive| drive.is_over()) else { return Ok(()) };
-        *if drive.is_tap() { &mut self.chains.taps } else { &mut self.chains.threads } += 1;
-        if drive.was_never_in_step() {
-            self.chains.warnings.push(messages::never_in_step(self.program, drive.span));
-        }
-        let (mechanism, pose) = (self.mechanism, self.setpoint.pose);
-        self.planner.switch(mechanism, pose, drive.span).map_err(|error| self.refused(&error))
-    }
-
-    /// The probe has met something: braking begins. The place is that of the period at whose end it answered.
-    fn watch_probe(&mut self) {
-        let Some(probing) = &mut self.probing else { return };
-        if probing.tripped.is_none() && self.fresh && self.feedback.probe != probing.probe.away {
-            probing.tripped = Some(self.setpoint.pose);
-            self.planner.abort();
-        }
-    }
-
-    /// A probing move has come to rest: the interpreter is told.
-    fn conclude_probing(&mut self) {
-        self.watch_probe();
-        if !self.fresh || !self.planner.is_idle() || !self.given.is_multiple_of(self.substeps.into()) {
-            return;
-        }
-        let Some(Probing { probe, span, tripped }) = self.probing.take() else { return };
-        let rests = self.planner.setpoint().pose;
-        if tripped.is_none() && probe.must_trip {
-            let failure = messages::probe_no_contact(self.program, self.machine, span, probe.away, &rests);
-            self.fail(failure);
-            return;
-        }
-        tell_probe(&mut self.interpreter, &tripped.unwrap_or(rests), tripped.is_some());
-        self.frame.set_position(rests.to_array());
-    }
-
-    /// The spindle is told what comes with the move that has begun.
-    fn order_spindle(&mut self) {
-        let now = self.planner.setpoint();
-        let begun = if now.state == State::Dwell { now.motion.wrapping_add(1) } else { now.motion };
-        let idle = self.planner.is_idle();
-        while let Some(&(motion, order)) = self.orders.front()
-            && (idle || motion <= begun)
-        {
-            self.spindle = order;
-            self.orders.pop_front();
-        }
-        if self.spindle.on {
-            self.orient = None;
-        }
-    }
-
-    /// M19: waits for the angle.
-    fn wait_for_angle(&mut self) -> Result<(), Diagnostic> {
-        let Some((span, waited)) = &mut self.orienting else { return Ok(()) };
-        if *waited > u64::from(self.substeps) && self.feedback.spindle.is_oriented {
-            self.orienting = None;
-            return Ok(());
-        }
-        *waited += 1;
-        let timeout_s = self.machine.spindle.timeout_s;
-        let most = timeout_s * 1e9 / self.machine.servo_period_ns as f64 * f64::from(self.substeps);
-        if *waited as f64 > most {
-            return Err(messages::orient_timeout(self.program, *span, timeout_s));
-        }
-        Ok(())
-    }
-
-    fn spindle_command(&self) -> SpindleCommand {
-        match &self.in_step {
-            Some(drive) => drive.command(),
-            None => SpindleCommand {
-                on: self.spindle.on,
-                speed_rpm: self.spindle.speed_rpm,
-                orient: self.orient,
-                index_enable: false,
-            },
         }
     }
 

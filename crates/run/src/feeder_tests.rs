@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::on_a_large_stack;
-use pkm_planner::path::FeedGroup;
+use crate::setup::{BLEND_RAD, inside, prepared, settings};
+use pkm_kins::maths;
+use pkm_planner::path::{FeedGroup, Tolerance};
 
 fn program(text: &str) -> Program {
     Program::Memory { name: "tested.ngc".to_owned(), text: text.as_bytes().to_vec() }

@@ -1,8 +1,8 @@
 //! What can be said of a program without a machine: its language alone.
 
 use crate::check::Checked;
-use crate::feeder::{prepared, settings};
 use crate::program::Program;
+use crate::setup::{prepared, settings};
 use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::{Canon, CanonSink, Span};

@@ -18,6 +18,7 @@ mod plan;
 mod probing;
 mod program;
 mod rehearsal;
+mod setup;
 mod summary;
 mod switch;
 mod synchronised;

@@ -1,9 +1,9 @@
 //! A chain in step with the spindle (G33, G76) or a rigid tap (G33.1), from rest to rest: what is checked before anything
 //! moves, and how it is driven.
 
-use crate::feeder::HostLimits;
 use crate::messages;
 use crate::program::Program;
+use crate::setup::HostLimits;
 use pkm_canon::Span;
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_hal_sim::{SpindleCommand, SpindleFeedback};
