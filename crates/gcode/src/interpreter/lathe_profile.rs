@@ -272,7 +272,7 @@ impl Height {
 
     /// What a tool that only climbs leaves, and the pockets below it.
     pub(super) fn climb(&self) -> (Self, Vec<Pocket>) {
-        let mut pieces = Vec::with_capacity(self.pieces.len());
+        let mut pieces: Vec<Piece> = Vec::with_capacity(self.pieces.len());
         let mut pockets: Vec<Pocket> = Vec::new();
         let mut rim = f64::NEG_INFINITY;
         for piece in &self.pieces {
@@ -284,8 +284,15 @@ impl Height {
                 true => piece.reach(rim),
             };
             if climbs_at - piece.from > SLIVER {
-                pieces.push(Piece::flat(piece.from, climbs_at, rim));
+                match pieces.last_mut() {
+                    Some(last) if matches!(last.curve, Curve::Line { through, slope: 0.0 } if through[1] == rim) =>
+                    {
+                        last.to = climbs_at;
+                    }
+                    _ => pieces.push(Piece::flat(piece.from, climbs_at, rim)),
+                }
                 match pockets.last_mut() {
+                    _ if begin.min(end) >= rim - SLIVER => {}
                     Some(pocket) if pocket.to >= piece.from - SLIVER && pocket.rim == rim => {
                         pocket.to = climbs_at;
                     }
