@@ -24,6 +24,11 @@ fn a_branch_without_an_end_is_told_beside_its_wrong_condition() {
 }
 
 #[test]
+fn a_branch_that_runs_without_an_end_is_told_beside_what_follows_its_head() {
+    expect("o1 if [1] junk\nG0 X1\nM2\n", &[(1, "o-unclosed"), (1, "o-trailing")]);
+}
+
+#[test]
 fn what_has_no_end_has_swallowed_m2() {
     for head in ["o1 if [0]", "o1 if [1]", "o1 while [0]", "o1 repeat [0]", "o1 do"] {
         expect(&format!("G0 X1\n{head}\nG0 X2\nM2\n"), &[(2, "o-unclosed")]);
