@@ -10,8 +10,9 @@ use pkm_gcode::{
 };
 use std::collections::BTreeSet;
 
-/// Rows that need an interpreter without memory, a file that cannot be read, or a start from a line (start_line.rs).
-const ELSEWHERE: [&str; 4] = ["param-memory", "o-memory", "file-open", "start-line"];
+/// Rows that need an interpreter without memory, a file that cannot be read, a start from a line (start_line.rs) or a lathe's
+/// profile (tested with its cycles).
+const ELSEWHERE: [&str; 5] = ["param-memory", "o-memory", "file-open", "start-line", "lathe-cycle"];
 /// A line has no room for so many: the row guards the list of settings.
 const OUT_OF_REACH: &str = "more than {limit} parameter settings in one block";
 
@@ -38,7 +39,7 @@ const PROGRAMS: [(&str, &str); 158] = [
     ("negative-s", "S-1|M2"),
     ("g-range", "G100|M2"),
     ("g-unknown", "G99.9|M2"),
-    ("g-unknown", "G71 Q1|M2"),
+    ("g-unknown", "G6.2 X1 Y1|M2"),
     ("m-unknown", "M300|M2"),
     ("m-unknown", "M100|M2"),
     ("m-too-many", "M3 M7 M48 M64 P1 M0 M6|M2"),
