@@ -478,7 +478,7 @@ pub(crate) enum HalCommand {
 
 #[derive(Debug, Args)]
 pub(crate) struct HalShow {
-    /// [FILE] [comp|pin|param|sig|funct|thread|all] [beginning of the name]
+    /// Optional: a HAL file; which of comp, pin, param, sig, funct, thread, all; the beginning of the names
     #[arg(num_args = 0..=3)]
     pub words: Vec<String>,
     /// The wired HAL of this machine
