@@ -17,7 +17,7 @@ const ELSEWHERE: [&str; 5] = ["param-memory", "o-memory", "file-open", "start-li
 const OUT_OF_REACH: &str = "more than {limit} parameter settings in one block";
 
 /// Identifier, and a program that raises it; `|` ends a line.
-const PROGRAMS: [(&str, &str); 158] = [
+const PROGRAMS: [(&str, &str); 173] = [
     ("file-empty", ""),
     ("file-no-end", "%|G0 X1"),
     ("file-no-end", "G0 X1"),
@@ -41,6 +41,21 @@ const PROGRAMS: [(&str, &str); 158] = [
     ("g-unknown", "G99.9|M2"),
     ("g-unknown", "G6.2 X1 Y1|M2"),
     ("m-unknown", "M300|M2"),
+    ("lathe-cycle", "G71 Q1|M2"),
+    ("lathe-cycle", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-5|o1 endsub|G0 X20 Z1|G91 G71 Q1|M2"),
+    ("lathe-cycle", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-5|o1 endsub|G0 X20 Z1|G71 Q1 Y1|M2"),
+    ("lathe-cycle", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-5|o1 endsub|G0 X20 Z1|G71 Q1 I0|M2"),
+    ("lathe-cycle", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-5|o1 endsub|G0 X20 Z1|G70 Q1 P0|M2"),
+    ("lathe-cycle", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-5|o1 endsub|G0 X20 Z1|G71 Q1 I0.0001|M2"),
+    ("lathe-cycle", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-5|o1 endsub|G0 X20 Z1|G71 Q1 X2 Z0|M2"),
+    ("lathe-profile", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-5|o1 endsub|G0 X20 Z1|G71 Q7|M2"),
+    ("lathe-profile", "G18 F1|o1 sub|G0 X2|o1 endsub|G0 X20 Z1|G71 Q1|M2"),
+    ("lathe-profile", "G18 F1|o1 sub|G3 X2 Z0 R20|G1 Z-4|o1 endsub|G0 X20 Z1|G71 Q1|M2"),
+    ("lathe-profile", "G18 F1|o1 sub|G0 X2 Z0|G81 Y-5 R9|o1 endsub|G0 X20 Z1|G71 Q1|M2"),
+    ("lathe-profile", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4 A9|X6 Z-5|o1 endsub|G0 X20 Z1|G71 Q1|M2"),
+    ("lathe-profile", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-2|X8 Z-9|o1 endsub|G0 X20 Z1|G71 Q1|M2"),
+    ("lathe-profile", "G18 F1|o1 sub|G0 X2 Z0|G1 X8|o1 endsub|G0 X20 Z1|G71 Q1|M2"),
+    ("lathe-profile", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-2|X1 Z-9|o1 endsub|G0 X20 Z1|G70 Q1|M2"),
     ("m-unknown", "M100|M2"),
     ("m-too-many", "M3 M7 M48 M64 P1 M0 M6|M2"),
     ("modal-clash", "G0 G1|M2"),
@@ -264,7 +279,9 @@ fn every_row_of_the_catalogue_is_raised() {
     let waiting = "F100\nG41 D1\nG1 X10\nX20\n".to_owned() + &"(wait)\n".repeat(2000);
     let points = "F100\nG5.2 X1 Y1 P1\n".to_owned() + &"X2 Y2 P1\n".repeat(300);
     let nested: String = (0..101).map(|n| format!("o{n} if [1]\n")).collect();
-    for text in [names, labels, waiting, points, nested] {
+    let profile =
+        "G18 F1\no1 sub\n".to_owned() + &"G1 W-1\n".repeat(1010) + "o1 endsub\nG0 X9 Z1\nG71 Q1\nM2\n";
+    for text in [names, labels, waiting, points, nested, profile] {
         told.extend(said(text.as_bytes(), settings(Dialect::Pkm)));
     }
     told.extend(said(b"\xef\xbb\xbfG0 X1\nM2\n", settings(Dialect::LinuxCnc29)));
