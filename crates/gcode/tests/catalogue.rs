@@ -12,7 +12,8 @@ use std::collections::BTreeSet;
 
 /// Rows that need an interpreter without memory, a file that cannot be read, a start from a line (start_line.rs) or a lathe's
 /// profile (tested with its cycles).
-const ELSEWHERE: [&str; 5] = ["param-memory", "o-memory", "file-open", "start-line", "lathe-cycle"];
+const ELSEWHERE: [&str; 6] =
+    ["param-memory", "o-memory", "file-open", "start-line", "lathe-cycle", "lathe-profile"];
 /// A line has no room for so many: the row guards the list of settings.
 const OUT_OF_REACH: &str = "more than {limit} parameter settings in one block";
 
