@@ -395,7 +395,7 @@ impl Kinematics for Hexapod {
         Ok(jacobian)
     }
 
-    /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈. Two struts at a time, each with the operations of [`Self::struts`] in their order.
+    /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈. Two struts at a time, each with the operations of `struts` in their order.
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
         Self::finite(pose)?;
         let at = Attitude::of(pose);
