@@ -10,10 +10,8 @@ use pkm_gcode::{
 };
 use std::collections::BTreeSet;
 
-/// Rows that need an interpreter without memory, a file that cannot be read, a start from a line (start_line.rs) or a lathe's
-/// profile (tested with its cycles).
-const ELSEWHERE: [&str; 6] =
-    ["param-memory", "o-memory", "file-open", "start-line", "lathe-cycle", "lathe-profile"];
+/// Rows that need an interpreter without memory, a file that cannot be read, or a start from a line (start_line.rs).
+const ELSEWHERE: [&str; 4] = ["param-memory", "o-memory", "file-open", "start-line"];
 /// A line has no room for so many: the row guards the list of settings.
 const OUT_OF_REACH: &str = "more than {limit} parameter settings in one block";
 

@@ -407,15 +407,14 @@ impl Kinematics for Hexapod {
         let rates = motion.velocity.as_chunks_mut().0.iter_mut();
         let seconds = motion.acceleration.as_chunks_mut().0.iter_mut();
         let struts = platform.zip(self.base.as_chunks().0).zip(lengths).zip(rates).zip(seconds);
-        for (((((points, bases), length), rate), second), joint) in struts.zip([0, 2, 4]) {
+        for (((((points, bases), length), rate), second), joints) in struts.zip([[0, 1], [2, 3], [4, 5]]) {
             let arm = pair::rotate(&at, pair::of(points));
             let d = pair::sub(pair::add(pair::both([pose.x, pose.y, pose.z]), arm), pair::of(bases));
             *length = sqrt_2(pair::dot(d, d));
-            if !(length[0] > 1e-9) {
-                return Err(InverseError::ZeroStrut { joint });
-            }
-            if !(length[1] > 1e-9) {
-                return Err(InverseError::ZeroStrut { joint: joint + 1 });
+            for (length, joint) in length.iter().zip(joints) {
+                if !(*length > 1e-9) {
+                    return Err(InverseError::ZeroStrut { joint });
+                }
             }
             let unit = pair::scale([1.0 / length[0], 1.0 / length[1]], d);
             let turn = pair::cross(pair::both(omega), arm);
@@ -424,8 +423,10 @@ impl Kinematics for Hexapod {
             let d_a = pair::add(pair::both([a.x, a.y, a.z]), bend);
             *rate = pair::dot(unit, d_v);
             let (along, square) = (pair::dot(unit, d_a), pair::dot(d_v, d_v));
-            let one = |i: usize| along[i] + (square[i] - rate[i] * rate[i]) / length[i];
-            *second = [one(0), one(1)];
+            let one =
+                |along: f64, square: f64, rate: f64, length: f64| along + (square - rate * rate) / length;
+            let ([a0, a1], [s0, s1], [r0, r1], [l0, l1]) = (along, square, *rate, *length);
+            *second = [one(a0, s0, r0, l0), one(a1, s1, r1, l1)];
         }
         if v.is_finite() && a.is_finite() { Ok(motion) } else { Err(InverseError::NotFinite) }
     }
@@ -499,9 +500,9 @@ mod pair {
     }
 
     #[inline]
-    pub(super) fn cross(u: Pair, v: Pair) -> Pair {
-        let minor = |i: usize, j: usize| minus(times(u[i], v[j]), times(u[j], v[i]));
-        [minor(1, 2), minor(2, 0), minor(0, 1)]
+    pub(super) fn cross([ux, uy, uz]: Pair, [vx, vy, vz]: Pair) -> Pair {
+        let minor = |a: Two, b: Two, c: Two, d: Two| minus(times(a, b), times(c, d));
+        [minor(uy, vz, uz, vy), minor(uz, vx, ux, vz), minor(ux, vy, uy, vx)]
     }
 
     /// As [`Attitude::rotate`].
