@@ -29,6 +29,9 @@ const PROGRAMS = {
   'ox-glide-x': relative(frame(4) + around('Z', 30)),
   lambda6: relative(frame(120, 3000) + around('ABC', 5) + around('Z', 60)),
   'lambda6-paper': relative(frame(60, 3000) + around('AB', 4) + around('Z', 60)),
+  // families, with the configuration their files begin with
+  moma: relative(frame(24)), 'moma-4s': relative(frame(24)), 'ox-glide': relative(frame(4) + around('Z', 30)),
+  'hv-mill': shipped('hv-mill-both.ngc'),
   xyz: relative(frame(80) + around('Z', 40)), xyzabc: relative(frame(80) + around('ABC', 30)),
 };
 
@@ -133,7 +136,7 @@ async function compare(page, trace, at) {
 // Of the two mechanisms of an HV-Mill only one follows the program; the coordinates of the other keep their values. It is the
 // one whose own coordinates changed last: X Y Z (places 0 to 2) or U V W (5 to 7 after B and C). −1: all paths count.
 function activePath(machine, trace, at) {
-  if (!/^hv-mill-[67]$/.test(machine)) return -1;
+  if (!/^hv-mill(-[67])?$/.test(machine)) return -1;
   const same = (a, b, from) => [0, 1, 2].every((i) => a.pose[from + i] === b.pose[from + i]);
   for (let i = at; i > 0; i -= 1) {
     if (!same(trace[i], trace[i - 1], 0)) return 0;
