@@ -36,6 +36,30 @@ fn errors_end_with_message_and_source_line() {
     assert!(all.stdout.contains("STRAIGHT_TRAVERSE"), "{}", all.stdout);
 }
 
+#[cfg(unix)]
+#[test]
+fn what_is_no_regular_file_is_written_and_never_replaced() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || std::fs::read_to_string(pipe).unwrap()
+    });
+    let run = pkm_with_input(&["canon", "-", "-o", pipe.to_str().unwrap()], b"G0 X1\nM2\n");
+    assert_eq!(run.status, 0, "{}", run.stderr);
+    assert!(std::fs::symlink_metadata(&pipe).unwrap().file_type().is_fifo(), "the pipe was replaced");
+    assert!(reader.join().unwrap().contains("STRAIGHT_TRAVERSE"));
+
+    let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+    write(&file, "old");
+    std::os::unix::fs::symlink(&file, &link).unwrap();
+    assert_eq!(pkm_with_input(&["canon", "-", "-o", link.to_str().unwrap()], b"G0 X1\nM2\n").status, 0);
+    assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink(), "the link was replaced");
+    assert!(std::fs::read_to_string(&file).unwrap().contains("STRAIGHT_TRAVERSE"));
+}
+
 #[test]
 fn settings_and_files() {
     let uvw = b"G0 U1\nM2\n";

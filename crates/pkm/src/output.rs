@@ -2,10 +2,11 @@
 //!
 //! A file is written under another name in the same folder, synced, then renamed; the folder is synced after it. Nothing
 //! is renamed before everything is written and synced, so a full disk leaves all old files as they were.
+//! What is no regular file (a pipe, `/dev/null`) is written straight and never replaced.
 
 use crate::outcome::Failure;
 use atomic_write_file::AtomicWriteFile;
-use std::fs::{File, create_dir_all};
+use std::fs::{File, OpenOptions, create_dir_all};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -22,7 +23,7 @@ pub(crate) struct Folder {
 #[derive(Debug)]
 pub(crate) struct Pending {
     path: PathBuf,
-    file: BufWriter<AtomicWriteFile>,
+    file: BufWriter<Target>,
     failed: Arc<AtomicBool>,
 }
 
@@ -42,10 +43,7 @@ impl Folder {
     /// It cannot be made.
     pub(crate) fn create(&self, name: &str) -> Result<Pending, Failure> {
         let path = self.path.join(name);
-        if path.is_dir() {
-            return Err(failure(&path, &io::ErrorKind::IsADirectory.into()));
-        }
-        let file = AtomicWriteFile::open(&path).map_err(|error| failure(&path, &error))?;
+        let file = Target::open(&path).map_err(|error| failure(&path, &error))?;
         Ok(Pending { path, file: BufWriter::new(file), failed: Arc::clone(&self.failed) })
     }
 
@@ -90,6 +88,68 @@ impl Write for Pending {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
+    }
+}
+
+/// One output file.
+#[derive(Debug)]
+pub(crate) enum Target {
+    /// A regular file or none yet: the name means the old content until [`Target::commit`].
+    Whole(AtomicWriteFile),
+    /// A pipe or a device.
+    Straight(File),
+}
+
+impl Target {
+    /// Begins the file that stands at `path`, behind its links.
+    ///
+    /// # Errors
+    /// It is a folder or cannot be made.
+    pub(crate) fn open(path: &Path) -> io::Result<Self> {
+        match path.metadata() {
+            Ok(known) if known.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
+            Ok(known) if !known.is_file() => OpenOptions::new().write(true).open(path).map(Self::Straight),
+            Ok(_) => AtomicWriteFile::open(path.canonicalize()?).map(Self::Whole),
+            Err(_) => AtomicWriteFile::open(path).map(Self::Whole),
+        }
+    }
+
+    /// Waits until the content is safe.
+    ///
+    /// # Errors
+    /// What the disk says.
+    pub(crate) fn sync_all(&self) -> io::Result<()> {
+        match self {
+            Self::Whole(file) => file.sync_all(),
+            Self::Straight(_) => Ok(()),
+        }
+    }
+
+    /// Puts the file in place of the old one.
+    ///
+    /// # Errors
+    /// What the disk says: then the old one is as it was.
+    pub(crate) fn commit(self) -> io::Result<()> {
+        match self {
+            Self::Whole(file) => file.commit(),
+            Self::Straight(_) => Ok(()),
+        }
+    }
+}
+
+impl Write for Target {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Whole(file) => file.write(bytes),
+            Self::Straight(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Whole(file) => file.flush(),
+            Self::Straight(file) => file.flush(),
+        }
     }
 }
 

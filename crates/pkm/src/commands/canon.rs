@@ -8,7 +8,6 @@ use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::render::canon_json::JsonWriter;
 use crate::render::diagnostics::{Json, Messages};
-use atomic_write_file::AtomicWriteFile;
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::text::{Spelling, TextWriter};
 use pkm_canon::{CanonSink, FileId, Motion9Writer};
@@ -79,7 +78,7 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
         }
         Some(path) => {
             let told = |error: io::Error| output::failure(path, &error);
-            let file = AtomicWriteFile::open(path).map_err(told)?;
+            let file = output::Target::open(path).map_err(told)?;
             let file = print(arguments, &mut interpreter, source.as_mut(), BufWriter::new(file), report)
                 .map_err(told)?;
             file.into_inner()
