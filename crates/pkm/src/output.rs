@@ -6,8 +6,9 @@
 
 use crate::outcome::Failure;
 use atomic_write_file::AtomicWriteFile;
+use serde::Serialize;
 use std::fs::{File, OpenOptions, create_dir_all};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Write, stdout};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -151,6 +152,22 @@ impl Write for Target {
             Self::Straight(file) => file.flush(),
         }
     }
+}
+
+/// One JSON value and the end of the line, to standard output.
+///
+/// # Errors
+/// Standard output cannot be written.
+pub(crate) fn json_line(value: &impl Serialize) -> Result<(), Failure> {
+    Ok(writeln!(stdout(), "{}", json(value)?)?)
+}
+
+/// One JSON value.
+///
+/// # Errors
+/// It holds what JSON cannot say.
+pub(crate) fn json(value: &impl Serialize) -> Result<String, Failure> {
+    Ok(serde_json::to_string(value).map_err(io::Error::from)?)
 }
 
 /// What the system said about a path.

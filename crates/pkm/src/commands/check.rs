@@ -1,8 +1,9 @@
 //! `pkm check`: everything that can be said before cutting.
 
 use crate::cli::{Check, Format};
-use crate::commands::program::{Job, Refused, Text};
+use crate::commands::program::{Job, Text, answered};
 use crate::outcome::{Failure, Outcome};
+use crate::output;
 use crate::render::diagnostics::{Json, Messages};
 use pkm_canon::diagnostic::Severity;
 use serde::Serialize;
@@ -21,16 +22,7 @@ struct Answer<'a> {
 }
 
 pub(crate) fn run(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
-    let answer = check(arguments, messages);
-    match (answer, arguments.program.format) {
-        (Err(Failure::CouldNot(diagnostics)), Format::Json) => {
-            serde_json::to_writer(stdout().lock(), &Refused::new(&arguments.program, &diagnostics))
-                .map_err(std::io::Error::from)?;
-            writeln!(stdout().lock())?;
-            Ok(Outcome::CouldNot)
-        }
-        (answer, _) => answer,
-    }
+    answered(&arguments.program, check(arguments, messages))
 }
 
 fn check(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
@@ -43,10 +35,9 @@ fn check(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
         let checked = pkm_run::check_language(&text.program, &text.options)?;
         (text.program, None, checked)
     };
-    let mut out = stdout().lock();
     match arguments.program.format {
         Format::Json => {
-            let answer = Answer {
+            output::json_line(&Answer {
                 schema: pkm_run::SCHEMA,
                 program: program.name(),
                 machine: machine.as_deref(),
@@ -54,14 +45,13 @@ fn check(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
                 blocks: checked.blocks,
                 moves: checked.moves,
                 diagnostics: checked.diagnostics.iter().map(Json::from).collect(),
-            };
-            writeln!(out, "{}", serde_json::to_string(&answer).map_err(std::io::Error::from)?)?;
+            })?;
         }
         Format::Text => {
             messages.print(&checked.diagnostics);
             let count = |severity| checked.diagnostics.iter().filter(|d| d.severity == severity).count();
             writeln!(
-                out,
+                stdout(),
                 "{}: {} blocks, {} moves{}: {}, {}",
                 program.name(),
                 checked.blocks,

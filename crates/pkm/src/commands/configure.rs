@@ -1,9 +1,10 @@
 //! `pkm configure`: which configuration of a reconfigurable machine runs a program best.
 
 use crate::cli::{Configure, Format, RankBy};
-use crate::commands::program::{Job, Refused};
+use crate::commands::program::{Job, answered};
 use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
+use crate::output;
 use crate::render::diagnostics::Messages;
 use comfy_table::{ContentArrangement, Table, presets};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -26,14 +27,7 @@ struct Answer<'a> {
 }
 
 pub(crate) fn run(arguments: &Configure, messages: &Messages) -> Result<Outcome, Failure> {
-    match (work(arguments, messages), arguments.program.format) {
-        (Err(Failure::CouldNot(diagnostics)), Format::Json) => {
-            let refused = Refused::new(&arguments.program, &diagnostics);
-            writeln!(stdout().lock(), "{}", serde_json::to_string(&refused).map_err(io::Error::from)?)?;
-            Ok(Outcome::CouldNot)
-        }
-        (outcome, _) => outcome,
-    }
+    answered(&arguments.program, work(arguments, messages))
 }
 
 fn work(arguments: &Configure, messages: &Messages) -> Result<Outcome, Failure> {
@@ -56,20 +50,18 @@ fn work(arguments: &Configure, messages: &Messages) -> Result<Outcome, Failure> 
     let found = search(&family, &program, &options, rank, threads, &progress);
     bar.finish_and_clear();
     let found = found?;
-    let mut out = stdout().lock();
     match arguments.program.format {
         Format::Json => {
-            let answer = Answer {
+            output::json_line(&Answer {
                 schema: pkm_run::SCHEMA,
                 program: program.name(),
                 machine: name,
                 runs: found.runs,
                 ended_early: found.ended,
                 configurations: &found.configurations,
-            };
-            writeln!(out, "{}", serde_json::to_string(&answer).map_err(io::Error::from)?)?;
+            })?;
         }
-        Format::Text => text(&mut out, &program.name(), name, &family, &found)?,
+        Format::Text => text(&mut stdout().lock(), &program.name(), name, &family, &found)?,
     }
     Ok(if found.ended {
         Outcome::Interrupted

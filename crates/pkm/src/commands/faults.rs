@@ -4,6 +4,7 @@ use crate::cli::{Format, Run};
 use crate::commands::program::Job;
 use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
+use crate::output;
 use crate::render::diagnostics::Messages;
 use pkm_hal_sim::PinFault;
 use pkm_machine::Machine;
@@ -94,11 +95,10 @@ pub(crate) fn random(arguments: &Run, count: u64, messages: &Messages) -> Result
 }
 
 fn print(all: &All, format: Format) -> Result<(), Failure> {
-    let mut out = stdout().lock();
     if format == Format::Json {
-        writeln!(out, "{}", serde_json::to_string(all).map_err(std::io::Error::from)?)?;
-        return Ok(());
+        return output::json_line(all);
     }
+    let mut out = stdout().lock();
     let mut counts: BTreeMap<&str, u64> = BTreeMap::new();
     for told in &all.faults {
         let answer = if told.objection.is_empty() { &told.outcome } else { "NOT as it must end" };

@@ -1,8 +1,9 @@
 //! `pkm plan`: how long every block takes and what limits it.
 
 use crate::cli::{Format, Plan};
-use crate::commands::program::{Job, Refused};
+use crate::commands::program::{Job, answered};
 use crate::outcome::{Failure, Outcome};
+use crate::output;
 use crate::render::diagnostics::{Json, Messages};
 use serde::Serialize;
 use std::io::{Write, stdout};
@@ -16,27 +17,20 @@ struct Answer<'a> {
 }
 
 pub(crate) fn run(arguments: &Plan, messages: &Messages) -> Result<Outcome, Failure> {
-    match (plan(arguments, messages), arguments.program.format) {
-        (Err(Failure::CouldNot(diagnostics)), Format::Json) => {
-            let refused = Refused::new(&arguments.program, &diagnostics);
-            writeln!(stdout().lock(), "{}", serde_json::to_string(&refused).map_err(std::io::Error::from)?)?;
-            Ok(Outcome::CouldNot)
-        }
-        (answer, _) => answer,
-    }
+    answered(&arguments.program, plan(arguments, messages))
 }
 
 fn plan(arguments: &Plan, messages: &Messages) -> Result<Outcome, Failure> {
     let job = Job::new(&arguments.program, messages)?;
     let plan = pkm_run::plan(&job.program, &job.machine, &job.options)?;
-    let mut out = stdout().lock();
     match arguments.program.format {
         Format::Json => {
             let answer =
                 Answer { plan: &plan, diagnostics: plan.diagnostics.iter().map(Json::from).collect() };
-            writeln!(out, "{}", serde_json::to_string(&answer).map_err(std::io::Error::from)?)?;
+            output::json_line(&answer)?;
         }
         Format::Text => {
+            let mut out = stdout().lock();
             messages.print(&plan.diagnostics);
             writeln!(out, "{} on {}: {:.3} s", plan.program, plan.machine, plan.duration_s)?;
             writeln!(out, "  {}", plan.verdict)?;

@@ -1,9 +1,10 @@
 //! What `run` and `check` have in common: the program, the machine, the start pose.
 
-use crate::cli::ProgramArgs;
+use crate::cli::{Format, ProgramArgs};
 use crate::commands::parameters::Kept;
 use crate::commands::tool_table;
-use crate::outcome::Failure;
+use crate::outcome::{Failure, Outcome};
+use crate::output;
 use crate::render::diagnostics::{self, Messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_kins::{Axis, Kinematics, Pose, maths};
@@ -28,7 +29,7 @@ pub(crate) struct Job {
 
 /// The answer in JSON when the question could not be asked.
 #[derive(Serialize)]
-pub(crate) struct Refused<'a> {
+struct Refused<'a> {
     schema: u32,
     program: String,
     machine: Option<&'a str>,
@@ -37,7 +38,7 @@ pub(crate) struct Refused<'a> {
 }
 
 impl<'a> Refused<'a> {
-    pub(crate) fn new(arguments: &'a ProgramArgs, diagnostics: &'a [Diagnostic]) -> Self {
+    fn new(arguments: &'a ProgramArgs, diagnostics: &'a [Diagnostic]) -> Self {
         Self {
             schema: pkm_run::SCHEMA,
             program: arguments.program.display().to_string(),
@@ -45,6 +46,20 @@ impl<'a> Refused<'a> {
             completed: false,
             diagnostics: diagnostics.iter().map(diagnostics::Json::from).collect(),
         }
+    }
+}
+
+/// How a command ends: whoever asked for JSON gets it also when the question could not be asked.
+pub(crate) fn answered(
+    arguments: &ProgramArgs,
+    result: Result<Outcome, Failure>,
+) -> Result<Outcome, Failure> {
+    match (result, arguments.format) {
+        (Err(Failure::CouldNot(diagnostics)), Format::Json) => {
+            output::json_line(&Refused::new(arguments, &diagnostics))?;
+            Ok(Outcome::CouldNot)
+        }
+        (result, _) => result,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::cli::{Format, Run};
 use crate::commands::faults;
-use crate::commands::program::{Job, Refused};
+use crate::commands::program::{Job, answered};
 use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
 use crate::output::{Folder, Pending};
@@ -57,14 +57,7 @@ pub(crate) fn run(arguments: &Run, messages: &Messages) -> Result<Outcome, Failu
         Some(count) => faults::random(arguments, count, messages),
         None => drive(arguments, messages),
     };
-    match (result, arguments.program.format) {
-        (Err(Failure::CouldNot(diagnostics)), Format::Json) => {
-            let refused = Refused::new(&arguments.program, &diagnostics);
-            writeln!(stdout().lock(), "{}", serde_json::to_string(&refused).map_err(std::io::Error::from)?)?;
-            Ok(Outcome::CouldNot)
-        }
-        (outcome, _) => outcome,
-    }
+    answered(&arguments.program, result)
 }
 
 fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {

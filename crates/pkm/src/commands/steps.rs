@@ -2,6 +2,7 @@
 
 use crate::cli::{Steps, StepsFormat};
 use crate::outcome::{Failure, Outcome};
+use crate::output;
 use pkm_hal_sim::StreamSteps;
 use serde::Serialize;
 use std::fs::read;
@@ -65,7 +66,7 @@ pub(crate) fn run(arguments: &Steps) -> Result<Outcome, Failure> {
     match arguments.format {
         StepsFormat::Csv => {}
         StepsFormat::Json => {
-            writeln!(out, "{}", serde_json::to_string(&sums).map_err(std::io::Error::from)?)?;
+            output::json_line(&sums)?;
         }
         StepsFormat::Text => {
             let steps: u64 = sums.joints.iter().map(|joint| joint.steps).sum();

@@ -2,7 +2,7 @@
 
 use crate::cli::{Format, Workspace};
 use crate::outcome::{Failure, Outcome};
-use crate::output::{Folder, Pending};
+use crate::output::{self, Folder, Pending};
 use crate::render::diagnostics::{self, Messages};
 use pkm_analysis::figure::png::png;
 use pkm_analysis::parallel;
@@ -52,10 +52,9 @@ fn work(arguments: &Workspace, messages: &Messages) -> Result<Outcome, Failure> 
         }
     };
     save(arguments, &answer)?;
-    let mut out = stdout().lock();
     match arguments.format {
-        Format::Json => writeln!(out, "{}", json(&answer.summary)?)?,
-        Format::Text => text(&mut out, &answer.summary)?,
+        Format::Json => output::json_line(&answer.summary)?,
+        Format::Text => text(&mut stdout().lock(), &answer.summary)?,
     }
     Ok(Outcome::Clean)
 }
@@ -74,8 +73,7 @@ fn refuse(arguments: &Workspace, diagnostics: &[Diagnostic]) -> Result<(), Failu
         machine: &arguments.machine.machine,
         diagnostics: diagnostics.iter().map(diagnostics::Json::from).collect(),
     };
-    writeln!(stdout().lock(), "{}", serde_json::to_string(&refused).map_err(io::Error::from)?)?;
-    Ok(())
+    output::json_line(&refused)
 }
 
 fn code(error: &WorkspaceError) -> &'static str {
@@ -102,10 +100,6 @@ fn help(error: &WorkspaceError) -> &'static str {
     }
 }
 
-fn json(summary: &Summary) -> Result<String, Failure> {
-    Ok(serde_json::to_string(summary).map_err(io::Error::from)?)
-}
-
 /// All files at once: old ones stay if one cannot be written.
 fn save(arguments: &Workspace, answer: &Answer) -> Result<(), Failure> {
     let folder = Folder::new(&arguments.out)?;
@@ -116,7 +110,7 @@ fn save(arguments: &Workspace, answer: &Answer) -> Result<(), Failure> {
         ("workspace.svg".to_owned(), svg.clone().into_bytes()),
         ("workspace.png".to_owned(), raster(&svg)?),
         ("workspace.csv".to_owned(), table),
-        ("workspace.json".to_owned(), format!("{}\n", json(&answer.summary)?).into_bytes()),
+        ("workspace.json".to_owned(), format!("{}\n", output::json(&answer.summary)?).into_bytes()),
     ];
     files.extend(answer.objects().into_iter().map(|(name, text)| (name, text.into_bytes())));
     write_all(folder, &files)

@@ -1,6 +1,7 @@
 //! The summary of a run, for scripts and for people.
 
 use crate::outcome::Failure;
+use crate::output;
 use crate::render::diagnostics;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use pkm_run::Summary;
@@ -18,7 +19,7 @@ struct Json<'a> {
 /// One JSON object.
 pub(crate) fn json(summary: &Summary) -> Result<String, Failure> {
     let diagnostics = summary.diagnostics.iter().map(diagnostics::Json::from).collect();
-    Ok(serde_json::to_string(&Json { summary, diagnostics }).map_err(std::io::Error::from)?)
+    output::json(&Json { summary, diagnostics })
 }
 
 /// Some lines and a table.
