@@ -46,6 +46,15 @@ pub trait Observer {
     fn tick(&mut self, report: &TickReport<'_>);
 }
 
+/// Nobody looks on.
+impl Observer for () {
+    fn wants_edges(&self) -> bool {
+        false
+    }
+    fn edge(&mut self, _: &Edge) {}
+    fn tick(&mut self, _: &TickReport<'_>) {}
+}
+
 /// What a joint did so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct JointStatistics {

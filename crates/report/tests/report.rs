@@ -1,31 +1,20 @@
 //! The page of a run: the same bytes every time, bounded, and nothing in it that a program could have made markup.
 //! What it looks like and does is for the browser test, `.ci/judge-report`.
 
-use pkm_hal_sim::{Edge, Observer, TickReport};
 use pkm_kins::{Kinematics, Mechanism, Pose};
 use pkm_machine::{Machine, shipped};
 use pkm_report::Recorder;
 use pkm_run::{Judged, Options, Program, Summary, check_with, run_checked};
 use std::ops::ControlFlow;
 
-struct Nothing;
-
-impl Observer for Nothing {
-    fn wants_edges(&self) -> bool {
-        false
-    }
-    fn edge(&mut self, _: &Edge) {}
-    fn tick(&mut self, _: &TickReport<'_>) {}
-}
-
 fn page(machine: &Machine, text: &[u8]) -> (String, Summary) {
     let program = Program::Memory { name: "</title>.ngc".to_owned(), text: text.to_vec() };
     let options = Options::default();
     let mut recorder = Recorder::new(machine, machine.home);
     let checked = check_with(&program, machine, &options, |step| recorder.programmed(step)).unwrap();
-    let judged = |_: &mut Nothing, judged: &Judged| recorder.judged(judged);
+    let judged = |_: &mut (), judged: &Judged| recorder.judged(judged);
     let go_on = |_: &_| ControlFlow::Continue(());
-    let run = run_checked(&program, machine, &options, checked, |_| Nothing, go_on, judged);
+    let run = run_checked(&program, machine, &options, checked, |_| (), go_on, judged);
     let summary = run.unwrap().0;
     let mut out = Vec::new();
     recorder.write(&summary, text, &mut out).unwrap();
@@ -38,11 +27,11 @@ fn first_period(machine: &Machine, text: &[u8]) -> Judged {
     let options = Options::default();
     let checked = check_with(&program, machine, &options, |_| {}).unwrap();
     let mut first = None;
-    let judged = |_: &mut Nothing, judged: &Judged| {
+    let judged = |_: &mut (), judged: &Judged| {
         first.get_or_insert(*judged);
     };
     let go_on = |_: &_| ControlFlow::Continue(());
-    run_checked(&program, machine, &options, checked, |_| Nothing, go_on, judged).unwrap();
+    run_checked(&program, machine, &options, checked, |_| (), go_on, judged).unwrap();
     first.unwrap()
 }
 

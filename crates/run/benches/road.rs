@@ -12,16 +12,6 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
-struct Nothing;
-
-impl Observer for Nothing {
-    fn wants_edges(&self) -> bool {
-        false
-    }
-    fn edge(&mut self, _: &pkm_stepgen::Edge) {}
-    fn tick(&mut self, _: &TickReport<'_>) {}
-}
-
 struct Files {
     trace: TraceWriter<std::io::Sink>,
     vcd: VcdWriter<std::io::Sink>,
@@ -61,9 +51,9 @@ fn median(mut times: Vec<f64>) -> f64 {
 fn row(name: &str, machine: &str) {
     let machine = Machine::load(machine, &[]).expect("a shipped machine");
     let program = shipped(name);
-    let simulated = timed(&program, &machine, |_| Nothing).1;
+    let simulated = timed(&program, &machine, |_| ()).1;
     let simulated_s = simulated.servo_ticks as f64 * machine.servo_period_ns as f64 / 1e9;
-    let bare = median((0..5).map(|_| timed(&program, &machine, |_| Nothing).0).collect());
+    let bare = median((0..5).map(|_| timed(&program, &machine, |_| ()).0).collect());
     let files = |simulation: &Simulation| Files {
         trace: TraceWriter::new(sink(), simulation),
         vcd: VcdWriter::new(sink(), simulation),
@@ -121,7 +111,7 @@ fn main() {
     let program = Program::File(path.clone());
     let begin = Instant::now();
     let summary =
-        run(&program, &machine, &Options::default(), |_: &Simulation| Nothing, |_| ControlFlow::Continue(()));
+        run(&program, &machine, &Options::default(), |_: &Simulation| (), |_| ControlFlow::Continue(()));
     let seconds = begin.elapsed().as_secs_f64();
     let _ = std::fs::remove_file(&path);
     let (summary, _) = summary.expect("readable");

@@ -7,10 +7,9 @@
 use crate::program::Program;
 use crate::wiring::{self, Wiring};
 use crate::{Options, run};
-use pkm_hal_sim::{Free, Observer, Setpoint, Simulation, TickReport};
+use pkm_hal_sim::{Free, Setpoint, Simulation};
 use pkm_kins::{Axis, Joints, Kinematics, Pose, maths};
 use pkm_machine::{Machine, Refusal};
-use pkm_stepgen::Edge;
 use std::ops::ControlFlow;
 
 /// What is jogged.
@@ -166,16 +165,6 @@ fn drive_joint(
     Ok(simulation.tick_number())
 }
 
-struct Unseen;
-
-impl Observer for Unseen {
-    fn wants_edges(&self) -> bool {
-        false
-    }
-    fn edge(&mut self, _edge: &Edge) {}
-    fn tick(&mut self, _report: &TickReport<'_>) {}
-}
-
 /// World mode: a line, planned and run; the periods it took.
 fn drive_axis(
     machine: &Machine,
@@ -192,7 +181,7 @@ fn drive_axis(
     let text = format!("G21 G90 G94 G61\nG1 {}{} F{feed}\nM2\n", axis.letter(), face(target));
     let program = Program::Memory { name: "jog".to_owned(), text: text.into_bytes() };
     let options = Options { start: Some(*start), ..Options::default() };
-    let ran = run(&program, machine, &options, |_| Unseen, |_| ControlFlow::Continue(()));
+    let ran = run(&program, machine, &options, |_| (), |_| ControlFlow::Continue(()));
     let (summary, _) = ran.map_err(|error| failed(error.message))?;
     match summary.diagnostics.into_iter().find(|d| d.severity == pkm_canon::diagnostic::Severity::Error) {
         Some(error) => Err(failed(error.message)),

@@ -5,23 +5,13 @@
 #![allow(clippy::print_stdout, clippy::disallowed_methods)]
 
 use pkm_canon::diagnostic::Severity;
-use pkm_hal_sim::{Observer, Simulation, TickReport};
+use pkm_hal_sim::Simulation;
 use pkm_kins::{Axis, Kinematics};
 use pkm_machine::Machine;
 use pkm_run::{Options, Program, Summary, check, run};
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-
-struct Nothing;
-
-impl Observer for Nothing {
-    fn wants_edges(&self) -> bool {
-        false
-    }
-    fn edge(&mut self, _: &pkm_stepgen::Edge) {}
-    fn tick(&mut self, _: &TickReport<'_>) {}
-}
 
 /// Every axis that a machine can move from its home, there and back, alone and with all the others.
 fn every_axis(machine: &Machine) -> Program {
@@ -48,7 +38,7 @@ fn every_axis(machine: &Machine) -> Program {
 
 fn row(program: &Program, machine: &Machine) -> Result<String, String> {
     let result =
-        run(program, machine, &Options::default(), |_: &Simulation| Nothing, |_| ControlFlow::Continue(()));
+        run(program, machine, &Options::default(), |_: &Simulation| (), |_| ControlFlow::Continue(()));
     let (summary, _) = result.expect("a readable program");
     let error = summary.diagnostics.iter().find(|d| d.severity == Severity::Error);
     match error {
