@@ -333,9 +333,7 @@ fn judge(machine: &Machine, rows_text: &str, end: &str, program: &str) -> Result
     }
     let end: Vec<f64> = end.split_whitespace().filter_map(|number| number.parse().ok()).collect();
     let end: [f64; 9] = end.try_into().map_err(|_| "end.txt is no pose")?;
-    // Joints that a switch leaves idle stand where LinuxCNC's interpolation had them when it came, a little before the axes' place.
-    let held = if machine.switches.is_empty() { 1e-6 } else { 1e-4 };
-    if distance(&end, &last.pose) > held {
+    if distance(&end, &last.pose) > 1e-6 {
         return Err(format!("LinuxCNC's forward says {end:?}, the axes are at {:?}", last.pose));
     }
     Ok(format!(
