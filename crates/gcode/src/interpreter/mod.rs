@@ -331,6 +331,8 @@ impl Interpreter {
                 if frame_begins {
                     return Ok(Status::Running);
                 }
+                // A line that cannot be read counts too: a loop of such lines must end.
+                self.count_block(place)?;
                 loaded?;
                 if refused {
                     let span = self.line.span(0, BYTE_ORDER_MARK.len());
@@ -399,7 +401,6 @@ impl Interpreter {
         source: &mut dyn LineSource,
         sink: &mut dyn CanonSink,
     ) -> Result<Status, Error> {
-        self.count_block(here)?;
         let trimmed = self.line.raw().trim_ascii_start();
         let framed = self.phase == Phase::Running { framed: true };
         match trimmed {
