@@ -137,7 +137,8 @@ fn run(files: &mut Files<'_>, settings: Settings, start_line: Option<u32>) {
         return;
     }
     let lines: usize = files.lines.iter().map(Vec::len).sum();
-    for _ in 0..=lines + MOST_BLOCKS as usize + 1 {
+    // Every line once, and what may be executed again; each may begin a search that meets the end of the file.
+    for _ in 0..2 * (lines + MOST_BLOCKS as usize + 1) {
         match interpreter.step(files, &mut Finite) {
             Ok(Status::Ended) => return,
             Ok(_) => {}
