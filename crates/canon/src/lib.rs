@@ -9,6 +9,7 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+mod buffer;
 mod command;
 mod decimal;
 #[cfg(feature = "alloc")]

@@ -1,7 +1,8 @@
 //! What moves, in nine axes: one command a line, `LINE COMMAND(arguments)`, lengths in mm, angles in degrees, six decimals.
 //! Everything that does not move, place or pause the tool is left out; so is all that comes before the first block.
 
-use crate::text::{Buffer, LineOutput};
+use crate::buffer::Buffer;
+use crate::text::LineOutput;
 use crate::{Canon, CanonSink, LengthUnit, Plane, Position, Span};
 
 /// Decimals of every number.
@@ -38,7 +39,7 @@ impl<O: LineOutput> Motion9Writer<O> {
             if i > 0 || first.is_some() {
                 self.line.put(b", ");
             }
-            self.line.number(*value, DECIMALS);
+            self.line.number::<DECIMALS>(*value);
         }
         self.line.put(b")");
     }
@@ -54,13 +55,13 @@ impl<O: LineOutput> Motion9Writer<O> {
         let [first_centre, second_centre] = centre.map(|value| value * self.units.mm());
         self.line.put(b"ARC_FEED(");
         for value in [first, second, first_centre, second_centre] {
-            self.line.number(value, DECIMALS);
+            self.line.number::<DECIMALS>(value);
             self.line.put(b", ");
         }
         self.line.integer(turns.into());
         for value in core::iter::once(normal).chain(others) {
             self.line.put(b", ");
-            self.line.number(value, DECIMALS);
+            self.line.number::<DECIMALS>(value);
         }
         self.line.put(b")");
     }

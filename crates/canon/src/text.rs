@@ -1,6 +1,6 @@
 //! The canonical commands as text, exactly as LinuxCNC's `rs274 -g` prints them.
 
-use crate::decimal::Decimal;
+use crate::buffer::Buffer;
 use crate::{Canon, CanonSink, Direction, LengthUnit, MotionControlMode, Plane, Position, Span, Tool};
 
 /// Which LinuxCNC's spelling.
@@ -31,9 +31,6 @@ impl<F: FnMut(&[u8])> LineOutput for F {
         self(bytes);
     }
 }
-
-/// Longest line: a source line's comment with its substitutions, or nine huge numbers.
-const LINE_ROOM: usize = 4096;
 
 /// Writes canonical commands in LinuxCNC's text format: sequence number, N column, command.
 pub struct TextWriter<O> {
@@ -113,64 +110,14 @@ impl<O: LineOutput> CanonSink for TextWriter<O> {
 
 const NO_NUMBER: &[u8] = b"N..... ";
 
-/// A bounded line; what does not fit is cut.
-pub(crate) struct Buffer<const ROOM: usize = LINE_ROOM> {
-    bytes: [u8; ROOM],
-    length: usize,
-}
-
-impl<const ROOM: usize> Buffer<ROOM> {
-    pub(crate) const fn new() -> Self {
-        Self { bytes: [0; ROOM], length: 0 }
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.length = 0;
-    }
-
-    pub(crate) fn as_bytes(&self) -> &[u8] {
-        &self.bytes[..self.length]
-    }
-
-    pub(crate) fn put(&mut self, bytes: &[u8]) {
-        let count = bytes.len().min(ROOM - self.length);
-        self.bytes[self.length..self.length + count].copy_from_slice(&bytes[..count]);
-        self.length += count;
-    }
-
-    pub(crate) fn integer(&mut self, value: i64) {
-        if value < 0 {
-            self.put(b"-");
-        }
-        self.padded(value.unsigned_abs(), 1);
-    }
-
-    /// Right-aligned in `width` places.
-    pub(crate) fn padded(&mut self, mut value: u64, width: usize) {
-        let mut digits = [b' '; 20];
-        let mut start = digits.len();
-        loop {
-            start -= 1;
-            digits[start] = b'0' + (value % 10) as u8;
-            value /= 10;
-            if value == 0 {
-                break;
-            }
-        }
-        self.put(&digits[start.min(digits.len() - width)..]);
-    }
-
-    pub(crate) fn number(&mut self, value: f64, decimals: u32) {
-        self.put(Decimal::new(value, decimals).as_bytes());
-    }
-
+impl Buffer {
     /// Numbers with four decimals and a separator between them.
     fn numbers(&mut self, values: &[f64], separator: &[u8]) {
         for (i, value) in values.iter().enumerate() {
             if i > 0 {
                 self.put(separator);
             }
-            self.number(*value, 4);
+            self.number::<4>(*value);
         }
     }
 
@@ -187,7 +134,7 @@ impl<const ROOM: usize> Buffer<ROOM> {
         self.integer(index.into());
         for value in values {
             self.put(b", ");
-            self.number(*value, 4);
+            self.number::<4>(*value);
         }
         self.put(b")");
     }
@@ -233,7 +180,7 @@ fn write_command(out: &mut Buffer, command: &Canon<'_>, spelling: Spelling, plan
         Canon::TurnProbe(on) => out.put(if on { b"TURN_PROBE_ON()" } else { b"TURN_PROBE_OFF()" }),
         Canon::StartSpeedFeedSync { feed_per_turn, velocity_mode, .. } => {
             out.put(b"START_SPEED_FEED_SYNC(");
-            out.number(feed_per_turn, 6);
+            out.number::<6>(feed_per_turn);
             out.put(b",");
             out.integer(velocity_mode.into());
             out.put(b")");
@@ -265,7 +212,7 @@ fn write_command(out: &mut Buffer, command: &Canon<'_>, spelling: Spelling, plan
                 MotionControlMode::ExactPath => out.put(b"CANON_EXACT_PATH"),
                 MotionControlMode::Continuous { tolerance } => {
                     out.put(b"CANON_CONTINUOUS, ");
-                    out.number(tolerance, 6);
+                    out.number::<6>(tolerance);
                 }
                 MotionControlMode::Unset => out.put(b"UNKNOWN"),
             }
@@ -276,7 +223,7 @@ fn write_command(out: &mut Buffer, command: &Canon<'_>, spelling: Spelling, plan
             out.put(b"SET_PLANNER_MODE(type=");
             out.integer(kind.into());
             out.put(b", peak_scale=");
-            out.number(peak_scale, 6);
+            out.number::<6>(peak_scale);
             out.put(b")");
         }
         Canon::SetG5xOffset { system, offset } => out.call_indexed("SET_G5X_OFFSET", system, &six(&offset)),
@@ -296,7 +243,7 @@ fn write_command(out: &mut Buffer, command: &Canon<'_>, spelling: Spelling, plan
             out.put(b"SET_SPINDLE_MODE(");
             out.integer(spindle.into());
             out.put(b" ");
-            out.number(css_limit, 4);
+            out.number::<4>(css_limit);
             out.put(b")");
         }
         Canon::SetSpindleSpeed { spindle, speed } => {
@@ -313,7 +260,7 @@ fn write_command(out: &mut Buffer, command: &Canon<'_>, spelling: Spelling, plan
             out.put(b"ORIENT_SPINDLE(");
             out.integer(spindle.into());
             out.put(b", ");
-            out.number(angle, 4);
+            out.number::<4>(angle);
             out.put(b", ");
             out.integer(mode.into());
             out.put(b")");
@@ -392,7 +339,7 @@ fn write_output(out: &mut Buffer, name: &str, index: i32, value: f64) {
     out.put(name.as_bytes());
     out.integer(index.into());
     out.put(b",");
-    out.number(value, 6);
+    out.number::<6>(value);
     out.put(b")");
 }
 

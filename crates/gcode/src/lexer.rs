@@ -4,10 +4,9 @@
 //! Input is the rest of the line: its length says where a token begins, because all rests end together.
 
 use crate::error::ErrorKind;
-use nom::branch::alt;
-use nom::bytes::complete::{tag, take_till, take_while, take_while1};
-use nom::character::complete::{char, digit1, one_of};
-use nom::combinator::{map, opt, recognize, value};
+use nom::bytes::complete::{take_till, take_while1};
+use nom::character::complete::{char, digit1};
+use nom::combinator::{map, opt, value};
 use nom::error::ParseError;
 use nom::sequence::{delimited, preceded};
 use nom::{IResult, Parser};
@@ -54,41 +53,37 @@ pub(crate) fn into_fault(error: nom::Err<Fault>) -> Fault {
     }
 }
 
-/// A decimal number: optional sign, digits, at most one point, at least one digit; no exponent.
+/// A decimal number: optional sign, digits, at most one point, at least one digit; no exponent. Correctly rounded.
 pub(crate) fn number(input: Rest<'_>) -> Read<'_, f64> {
-    let (rest, text) =
-        recognize((opt(one_of("+-")), take_while(|b: u8| b.is_ascii_digit() || b == b'.'))).parse(input)?;
-    match decimal(text) {
-        Some(number) => Ok((rest, number)),
-        None if text.is_empty() => Err(fault_here(ErrorKind::NumberMissing, input)),
-        None => Err(fault(ErrorKind::BadNumber, input, rest)),
+    let (negative, mut rest) = match input {
+        [sign @ (b'+' | b'-'), rest @ ..] => (*sign == b'-', rest),
+        _ => (false, input),
+    };
+    let (mut mantissa, mut digits, mut decimals, mut points) = (0_u64, 0_usize, 0_usize, 0_usize);
+    while let [byte @ (b'0'..=b'9' | b'.'), after @ ..] = rest {
+        if *byte == b'.' {
+            points += 1;
+        } else {
+            mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
+            digits += 1;
+            decimals += points;
+        }
+        rest = after;
     }
-}
-
-/// The value of `[+-]digits[.digits]`, correctly rounded.
-fn decimal(text: &[u8]) -> Option<f64> {
+    if digits == 0 || points > 1 {
+        return Err(match rest.len() == input.len() {
+            true => fault_here(ErrorKind::NumberMissing, input),
+            false => fault(ErrorKind::BadNumber, input, rest),
+        });
+    }
     // Up to 15 digits and 10^-15: both exact in f64, so one division rounds correctly.
-    let (mut mantissa, mut digits, mut decimals, mut point) = (0_u64, 0_usize, 0_usize, false);
-    for &byte in text {
-        match byte {
-            b'.' if point => return None,
-            b'.' => point = true,
-            b'0'..=b'9' => {
-                digits += 1;
-                decimals += usize::from(point);
-                mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
-            }
-            _ => {}
-        }
+    if digits <= 15 {
+        let magnitude = mantissa as f64 / POWERS[decimals];
+        return Ok((rest, if negative { -magnitude } else { magnitude }));
     }
-    match digits {
-        0 => None,
-        1..=15 => {
-            let magnitude = mantissa as f64 / POWERS[decimals];
-            Some(if text.first() == Some(&b'-') { -magnitude } else { magnitude })
-        }
-        _ => core::str::from_utf8(text).ok()?.parse().ok(),
-    }
+    let text = core::str::from_utf8(&input[..input.len() - rest.len()]).unwrap_or_default();
+    let number = text.parse().map_err(|_| fault(ErrorKind::BadNumber, input, rest))?;
+    Ok((rest, number))
 }
 
 const POWERS: [f64; 16] =
@@ -153,26 +148,27 @@ impl Operator {
     }
 }
 
+const OPERATORS: [(&[u8], Operator); 15] = [
+    (b"**", Operator::Power),
+    (b"*", Operator::Multiply),
+    (b"/", Operator::Divide),
+    (b"+", Operator::Add),
+    (b"-", Operator::Subtract),
+    (b"mod", Operator::Modulo),
+    (b"eq", Operator::Equal),
+    (b"ne", Operator::NotEqual),
+    (b"ge", Operator::GreaterEqual),
+    (b"gt", Operator::Greater),
+    (b"le", Operator::LessEqual),
+    (b"lt", Operator::Less),
+    (b"and", Operator::And),
+    (b"or", Operator::Or),
+    (b"xor", Operator::Xor),
+];
+
 /// An operator.
 pub(crate) fn operator(input: Rest<'_>) -> Read<'_, Operator> {
-    alt((
-        value(Operator::Power, tag("**")),
-        value(Operator::Multiply, char('*')),
-        value(Operator::Divide, char('/')),
-        value(Operator::Add, char('+')),
-        value(Operator::Subtract, char('-')),
-        value(Operator::Modulo, tag("mod")),
-        value(Operator::Equal, tag("eq")),
-        value(Operator::NotEqual, tag("ne")),
-        value(Operator::GreaterEqual, tag("ge")),
-        value(Operator::Greater, tag("gt")),
-        value(Operator::LessEqual, tag("le")),
-        value(Operator::Less, tag("lt")),
-        value(Operator::And, tag("and")),
-        value(Operator::Or, tag("or")),
-        value(Operator::Xor, tag("xor")),
-    ))
-    .parse(input)
+    word(&OPERATORS, input)
 }
 
 /// A function of one argument (ATAN: of two).
@@ -195,25 +191,26 @@ pub(crate) enum Function {
     Tan,
 }
 
+const FUNCTIONS: [(&[u8], Function); 14] = [
+    (b"abs", Function::Abs),
+    (b"acos", Function::Acos),
+    (b"asin", Function::Asin),
+    (b"atan", Function::Atan),
+    (b"cos", Function::Cos),
+    (b"exists", Function::Exists),
+    (b"exp", Function::Exp),
+    (b"fix", Function::Fix),
+    (b"fup", Function::Fup),
+    (b"ln", Function::Ln),
+    (b"round", Function::Round),
+    (b"sin", Function::Sin),
+    (b"sqrt", Function::Sqrt),
+    (b"tan", Function::Tan),
+];
+
 /// A function name.
 pub(crate) fn function(input: Rest<'_>) -> Read<'_, Function> {
-    alt((
-        value(Function::Abs, tag("abs")),
-        value(Function::Acos, tag("acos")),
-        value(Function::Asin, tag("asin")),
-        value(Function::Atan, tag("atan")),
-        value(Function::Cos, tag("cos")),
-        value(Function::Exists, tag("exists")),
-        value(Function::Exp, tag("exp")),
-        value(Function::Fix, tag("fix")),
-        value(Function::Fup, tag("fup")),
-        value(Function::Ln, tag("ln")),
-        value(Function::Round, tag("round")),
-        value(Function::Sin, tag("sin")),
-        value(Function::Sqrt, tag("sqrt")),
-        value(Function::Tan, tag("tan")),
-    ))
-    .parse(input)
+    word(&FUNCTIONS, input)
 }
 
 /// The keyword of an o-word.
@@ -238,27 +235,39 @@ pub(crate) enum Keyword {
     Continue,
 }
 
-/// The keyword of an o-word; longer ones first.
+#[cfg(feature = "alloc")]
+const KEYWORDS: [(&[u8], Keyword); 15] = [
+    (b"sub", Keyword::Sub),
+    (b"endsub", Keyword::Endsub),
+    (b"call", Keyword::Call),
+    (b"return", Keyword::Return),
+    (b"if", Keyword::If),
+    (b"elseif", Keyword::Elseif),
+    (b"else", Keyword::Else),
+    (b"endif", Keyword::Endif),
+    (b"while", Keyword::While),
+    (b"endwhile", Keyword::Endwhile),
+    (b"do", Keyword::Do),
+    (b"repeat", Keyword::Repeat),
+    (b"endrepeat", Keyword::Endrepeat),
+    (b"break", Keyword::Break),
+    (b"continue", Keyword::Continue),
+];
+
+/// The keyword of an o-word.
 #[cfg(feature = "alloc")]
 pub(crate) fn keyword(input: Rest<'_>) -> Read<'_, Keyword> {
-    alt((
-        value(Keyword::Sub, tag("sub")),
-        value(Keyword::Endsub, tag("endsub")),
-        value(Keyword::Call, tag("call")),
-        value(Keyword::Return, tag("return")),
-        value(Keyword::If, tag("if")),
-        value(Keyword::Elseif, tag("elseif")),
-        value(Keyword::Else, tag("else")),
-        value(Keyword::Endif, tag("endif")),
-        value(Keyword::While, tag("while")),
-        value(Keyword::Endwhile, tag("endwhile")),
-        value(Keyword::Do, tag("do")),
-        value(Keyword::Repeat, tag("repeat")),
-        value(Keyword::Endrepeat, tag("endrepeat")),
-        value(Keyword::Break, tag("break")),
-        value(Keyword::Continue, tag("continue")),
-    ))
-    .parse(input)
+    word(&KEYWORDS, input)
+}
+
+/// The first of these words that the input begins with.
+fn word<'a, T: Copy>(words: &[(&[u8], T)], input: Rest<'a>) -> Read<'a, T> {
+    // The first byte decides mostly, without a call.
+    let begins = |text: &[u8]| text.first() == input.first() && input.starts_with(text);
+    match words.iter().find(|(text, _)| begins(text)) {
+        Some((text, found)) => Ok((&input[text.len()..], *found)),
+        None => Err(fault_here(ErrorKind::NumberMissing, input)),
+    }
 }
 
 /// One given byte.

@@ -8,16 +8,38 @@ use crate::lexer;
 use crate::source::MAX_LINE;
 use pkm_canon::{FileId, Span};
 
+/// Room for a line; every `u8` is a place in it.
+const ROOM: usize = 1 << 8;
+const _: () = assert!(MAX_LINE < ROOM);
+
+const BLANK: u8 = b' ';
+const LOOK: u8 = 0;
+
+/// What a byte outside comments becomes: lower case, every blank [`BLANK`]; [`LOOK`] = a comment may begin.
+const PREPARED: [u8; 256] = {
+    let mut prepared = [LOOK; 256];
+    let mut byte = 1_u8;
+    while byte != 0 {
+        prepared[byte as usize] = match byte {
+            b' ' | b'\t' | b'\r' | 0x0b | 0x0c => BLANK,
+            b'(' | b';' => LOOK,
+            _ => byte.to_ascii_lowercase(),
+        };
+        byte = byte.wrapping_add(1);
+    }
+    prepared
+};
+
 /// One line, raw and prepared.
 #[derive(Debug, Clone)]
 pub(crate) struct Line {
-    raw: [u8; MAX_LINE],
+    raw: [u8; ROOM],
     raw_length: usize,
     /// Lower case, no blanks outside comments, comments verbatim, no `;` comment.
-    code: [u8; MAX_LINE],
+    code: [u8; ROOM],
     code_length: usize,
     /// Source column of every byte of `code`.
-    column: [u8; MAX_LINE],
+    column: [u8; ROOM],
     pub(crate) file: FileId,
     /// Counted from 1.
     pub(crate) number: u32,
@@ -26,11 +48,11 @@ pub(crate) struct Line {
 impl Line {
     pub(crate) const fn new() -> Self {
         Self {
-            raw: [0; MAX_LINE],
+            raw: [0; ROOM],
             raw_length: 0,
-            code: [0; MAX_LINE],
+            code: [0; ROOM],
             code_length: 0,
-            column: [0; MAX_LINE],
+            column: [0; ROOM],
             file: FileId(0),
             number: 0,
         }
@@ -83,29 +105,38 @@ impl Line {
 
     /// Deletes blanks, lowers case, checks comments.
     pub(crate) fn prepare(&mut self) -> Result<(), Error> {
-        self.code_length = 0;
+        let Self { raw, code, column, .. } = self;
+        let mut length = 0_u8;
         let mut comment_start = None;
-        for i in 0..self.raw_length {
-            let byte = self.raw[i];
-            match (comment_start, byte) {
-                (Some(_), b')') => comment_start = None,
-                (Some(_), b'(') => {
-                    return Err(Error { kind: ErrorKind::NestedComment, span: self.span(i, i + 1) });
-                }
-                (Some(_), _) => {}
-                (None, b'(') => comment_start = Some(i),
-                (None, b';') => return Ok(()),
-                (None, b' ' | b'\t' | b'\r' | 0x0b | 0x0c) => continue,
-                (None, _) => {}
+        for at in 0..self.raw_length as u8 {
+            let byte = raw[usize::from(at)];
+            let prepared = if comment_start.is_none() { PREPARED[usize::from(byte)] } else { LOOK };
+            // What is not kept is written over by the next byte.
+            column[usize::from(length)] = at;
+            if prepared != LOOK {
+                code[usize::from(length)] = prepared;
+                length = length.wrapping_add(u8::from(prepared != BLANK));
+                continue;
             }
-            let byte = if comment_start.is_some() { byte } else { byte.to_ascii_lowercase() };
-            self.code[self.code_length] = byte;
-            self.column[self.code_length] = i as u8;
-            self.code_length += 1;
+            match (byte, comment_start) {
+                (b';', None) => break,
+                (b'(', None) => comment_start = Some(at),
+                (b'(', Some(_)) => {
+                    self.code_length = length.into();
+                    let span = self.span(at.into(), usize::from(at) + 1);
+                    return Err(Error { kind: ErrorKind::NestedComment, span });
+                }
+                (b')', _) => comment_start = None,
+                _ => {}
+            }
+            code[usize::from(length)] = byte;
+            length = length.wrapping_add(1);
         }
+        self.code_length = length.into();
         match comment_start {
             Some(start) => {
-                Err(Error { kind: ErrorKind::UnclosedComment, span: self.span(start, self.raw_length) })
+                let span = self.span(start.into(), self.raw_length);
+                Err(Error { kind: ErrorKind::UnclosedComment, span })
             }
             None => Ok(()),
         }

@@ -9,10 +9,8 @@ use crate::line::Line;
 /// A label as written: decimal digits or the name between the brackets.
 pub(crate) type LabelText = heapless::Vec<u8, 256>;
 
-/// Label and keyword as read.
+/// What follows a label.
 pub(crate) struct Head {
-    /// Empty if only a run can tell (the static check).
-    pub(crate) label: LabelText,
     /// `None`: a Fanuc program begins.
     pub(crate) keyword: Option<Keyword>,
     /// Offset of what follows in the prepared line.
@@ -21,12 +19,17 @@ pub(crate) struct Head {
     pub(crate) wrong: Option<Error>,
 }
 
-/// Reads label and keyword behind the `o` at `start`.
-pub(crate) fn head(line: &Line, start: usize, scope: &impl Scope) -> Result<Head, Error> {
+/// Reads label and keyword behind the `o` at `start`. The label is empty if only a run can tell it (the static check).
+pub(crate) fn head(
+    line: &Line,
+    start: usize,
+    scope: &impl Scope,
+    label: &mut LabelText,
+) -> Result<Head, Error> {
     let code = line.code();
     let fail = |kind, from, to| Error { kind, span: line.code_span(from, to) };
     let input = &code[start + 1..];
-    let mut label = LabelText::new();
+    label.clear();
     let rest = if input.first() == Some(&b'<') {
         let (rest, name) =
             lexer::name(input).map_err(|_| fail(ErrorKind::ParamNameOpen, start, code.len()))?;
@@ -39,7 +42,7 @@ pub(crate) fn head(line: &Line, start: usize, scope: &impl Scope) -> Result<Head
         let (rest, number) =
             expression::integer(input, scope).map_err(|error| fault_error(line, into_fault(error)))?;
         if number != UNKNOWN {
-            push_integer(&mut label, number);
+            push_integer(label, number);
         }
         rest
     };
@@ -50,20 +53,21 @@ pub(crate) fn head(line: &Line, start: usize, scope: &impl Scope) -> Result<Head
         Err(_) => {
             let length = rest.iter().take_while(|b| b.is_ascii_alphabetic()).count().max(1);
             let wrong = Some(fail(ErrorKind::OUnknown, at, at + length));
-            return Ok(Head { label, keyword: None, operands: at, wrong });
+            return Ok(Head { keyword: None, operands: at, wrong });
         }
     };
-    Ok(Head { label, keyword, operands, wrong: None })
+    Ok(Head { keyword, operands, wrong: None })
 }
 
 /// Appends a number in decimal digits.
 pub(crate) fn push_integer(text: &mut LabelText, number: i32) {
-    use core::fmt::Write;
-    struct Digits<'a>(&'a mut LabelText);
-    impl Write for Digits<'_> {
-        fn write_str(&mut self, s: &str) -> core::fmt::Result {
-            self.0.extend_from_slice(s.as_bytes()).map_err(|_| core::fmt::Error)
-        }
+    let (mut rest, mut digits, mut start) = (number.unsigned_abs(), [0; 10], 10);
+    while start > 0 && (rest > 0 || start == 10) {
+        start -= 1;
+        digits[start] = b'0' + (rest % 10) as u8;
+        rest /= 10;
     }
-    let _ = write!(Digits(text), "{number}");
+    let sign: &[u8] = if number < 0 { b"-" } else { b"" };
+    let _ = text.extend_from_slice(sign);
+    let _ = text.extend_from_slice(&digits[start..]);
 }

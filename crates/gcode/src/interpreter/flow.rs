@@ -85,6 +85,7 @@ pub(crate) struct Flow {
     continuing: bool,
     /// A part of the present `if` has run.
     branch_taken: bool,
+    /// The label of the o-word or call being executed, as written.
     text: LabelText,
     /// The o-word of the line being executed, for recovery.
     current: Option<(Name, Option<Keyword>, Span)>,
@@ -95,13 +96,21 @@ pub(crate) struct Flow {
 }
 
 impl Flow {
-    fn intern(&mut self, text: &[u8]) -> Label {
-        if let Some(label) = self.labels.get(text) {
+    /// The label written in `text`.
+    fn label(&mut self) -> Label {
+        if let Some(label) = self.labels.get(&*self.text) {
             return *label;
         }
         let label = self.labels.len() as Label;
-        self.labels.insert(text.into(), label);
+        self.labels.insert((&*self.text).into(), label);
         label
+    }
+
+    /// The label that is a number.
+    fn number_label(&mut self, number: i32) -> Label {
+        self.text.clear();
+        push_integer(&mut self.text, number);
+        self.label()
     }
 
     pub(crate) fn is_skipping(&self) -> bool {
@@ -189,12 +198,12 @@ impl Interpreter {
 
     /// Reads label and keyword behind the `o` at `start`.
     fn read_o_word(&mut self, start: usize) -> Result<OWord, Error> {
-        let Head { label: text, mut keyword, operands, wrong } =
-            o_word::head(&self.line, start, &self.state)?;
+        let Head { mut keyword, operands, wrong } =
+            o_word::head(&self.line, start, &self.state, &mut self.flow.text)?;
         if let Some(error) = wrong {
             // Within a definition that is passed LinuxCNC reads no keyword but sub, endsub and return; nor a call.
             if self.flow.defining.is_none() || self.state.settings.dialect == Dialect::Pkm {
-                let label = self.flow.intern(&text);
+                let label = self.flow.label();
                 self.flow.wrong.push(label);
                 return Err(error);
             }
@@ -204,8 +213,7 @@ impl Interpreter {
         if self.flow.labels.len() >= MOST_LABELS as usize {
             return Err(self.flow_error(ErrorKind::OTooMany { limit: MOST_LABELS }, span));
         }
-        let label = self.flow.intern(&text);
-        self.flow.text = text;
+        let label = self.flow.label();
         let scope = match keyword {
             None | Some(Keyword::Sub | Keyword::Endsub | Keyword::Call | Keyword::Return) => 0,
             Some(_) => self.scope(),

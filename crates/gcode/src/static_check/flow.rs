@@ -7,7 +7,7 @@ use crate::block::fault_error;
 use crate::error::{Error, ErrorKind};
 use crate::expression::{self, UNKNOWN};
 use crate::lexer::{Keyword, into_fault};
-use crate::o_word;
+use crate::o_word::{self, LabelText};
 use crate::parameters::{ARGUMENTS, Parameters};
 use crate::source::LineSource;
 use alloc::collections::{BTreeMap, BTreeSet};
@@ -46,16 +46,17 @@ pub(super) struct Open {
 impl StaticCheck<'_> {
     pub(super) fn o_word(&mut self, start: usize) {
         let seen = Unknowns::new(self.strict());
-        let head = match o_word::head(&self.line, start, &seen) {
+        let mut label = LabelText::new();
+        let head = match o_word::head(&self.line, start, &seen, &mut label) {
             Ok(head) => head,
             Err(error) => return self.fail(error),
         };
         if let Some(error) = head.wrong {
-            self.wrong.insert(head.label.to_vec());
+            self.wrong.insert(label.to_vec());
             return self.fail(error);
         }
         let span = self.line.code_span(start, head.operands);
-        let label = head.label.to_vec();
+        let label = label.to_vec();
         let Some(keyword) = head.keyword else {
             self.take_reads(&seen);
             return self.fanuc_begins(label, span);

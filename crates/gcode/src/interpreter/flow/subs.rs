@@ -1,6 +1,6 @@
 //! Subroutines: definition, call, return; Fanuc's programs with M98 and M99 (dialect section 5).
 
-use super::{Frame, Label, LabelText, MAX_CALLS, Name, OWord, Style, Sub, push_integer};
+use super::{Frame, Label, MAX_CALLS, Name, OWord, Style, Sub};
 use crate::error::{Error, ErrorKind};
 use crate::interpreter::saved::Saved;
 use crate::interpreter::{Interpreter, Out, Status};
@@ -223,10 +223,7 @@ impl Interpreter {
             }
             return Ok(());
         }
-        let mut text = LabelText::new();
-        push_integer(&mut text, number as i32);
-        let label = self.flow.intern(&text);
-        self.flow.text = text;
+        let label = self.flow.number_label(number as i32);
         self.enter(label, Style::Fanuc, span, repeats, None, source)
     }
 
@@ -237,9 +234,7 @@ impl Interpreter {
         if self.flow.frames.len() >= MAX_CALLS {
             return Err(self.flow_error(ErrorKind::ODepth { limit: MAX_CALLS as u8 }, span));
         }
-        let mut text = LabelText::new();
-        push_integer(&mut text, number);
-        let (here, sub) = (source.place(), self.flow.intern(&text));
+        let (here, sub) = (source.place(), self.flow.number_label(number));
         self.flow.frames.push(Frame {
             style: Style::Fanuc,
             call: span,
@@ -283,10 +278,7 @@ impl Interpreter {
         source: &mut dyn LineSource,
     ) -> Result<usize, Error> {
         let number = maths::round(self.block.get(b'Q').unwrap_or(0.0)).clamp(-1e9, 1e9) as i32;
-        let mut text = LabelText::new();
-        push_integer(&mut text, number);
-        let label = self.flow.intern(&text);
-        self.flow.text = text;
+        let label = self.flow.number_label(number);
         if self.flow.subs.get(&label).is_none_or(|sub| sub.style != Style::OWord) {
             return Err(self.block.word_error(b'Q', ErrorKind::LatheNoSub { number }));
         }
