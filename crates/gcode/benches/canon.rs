@@ -32,6 +32,8 @@ fn measure(command: &[&str], directory: &Path) -> Option<(f64, u64)> {
         .args(["120", "/usr/bin/time", "-o", figures.to_str()?, "-f", "%U %S %M"])
         .args(command)
         .current_dir(directory)
+        // Where rs274 keeps its map of the tools.
+        .env("HOME", directory)
         .stdout(std::process::Stdio::null())
         .stderr(std::process::Stdio::null())
         .status();
@@ -90,7 +92,7 @@ fn main() {
         text.push_str("M2\n");
         std::fs::write(directory.join("program.ngc"), text).expect("room for the program");
         let ours = measure(&[this, "--interpret", "program.ngc", "ours.txt"], &directory);
-        let theirs = measure(&["rs274", "-g", "program.ngc", "theirs.txt"], &directory);
+        let theirs = measure(&["rs274", "-v", "variables", "-g", "program.ngc", "theirs.txt"], &directory);
         let Some((seconds, kib)) = ours else {
             println!("{name:<18} not measured: is /usr/bin/time there?");
             continue;

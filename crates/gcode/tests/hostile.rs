@@ -1,25 +1,13 @@
 //! Hostile input (promise P5): any bytes end in a reading or a diagnostic with a place; never a panic, never a hang.
 
+#[path = "../fuzz/finite.rs"]
+#[allow(unreachable_pub)] // the fuzz targets use it too
+mod finite;
 mod support;
 
-use pkm_canon::{Canon, CanonSink, Span};
+use finite::Finite;
 use pkm_gcode::{ErrorKind, Interpreter, MemorySource, Settings, Status};
 use support::generator::{Flavour, Random, program};
-
-/// Refuses numbers that are not finite (promise P1).
-struct Finite;
-
-impl CanonSink for Finite {
-    fn command(&mut self, command: &Canon<'_>, _: Span) {
-        let positions = match command {
-            Canon::StraightTraverse(p) | Canon::StraightFeed(p) => p.to_array(),
-            Canon::ArcFeed { end, .. } | Canon::StraightProbe { end, .. } => end.to_array(),
-            Canon::SetG92Offset(p) | Canon::SetG5xOffset { offset: p, .. } => p.to_array(),
-            _ => return,
-        };
-        assert!(positions.iter().all(|v| v.is_finite()), "{command:?}");
-    }
-}
 
 /// Codes of all errors, going on after each.
 fn codes(text: &[u8]) -> Vec<&'static str> {

@@ -5,7 +5,7 @@ mod support;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use support::{Outcome, difference, has_rs274, pkm_file, rs274_file};
+use support::{Outcome, Rs274, difference, has_rs274, pkm_file};
 
 /// The package's tool table, which `rs274` uses by itself.
 const TOOL_TABLE: &str = "/usr/share/doc/linuxcnc/examples/sample-configs/common/tool.tbl";
@@ -53,12 +53,15 @@ fn programs_of_the_package_agree_with_rs274() {
         return;
     }
     let tools = std::fs::read(TOOL_TABLE).expect("the package's tool table");
+    let scratch = std::env::temp_dir().join(format!("pkm-package-{}", std::process::id()));
+    std::fs::create_dir_all(&scratch).expect("a scratch directory");
     let (mut unexplained, mut explained, mut endless) = (Vec::new(), Vec::new(), Vec::new());
     for program in &programs {
         let name = program.display().to_string();
         let reason = ALLOWED.iter().find(|(end, _)| name.ends_with(end));
         let beside = program.parent().expect("a folder");
-        let Some(oracle) = rs274_file(program, Path::new(TOOL_TABLE), beside) else {
+        let run = Rs274 { program, tools: Path::new(TOOL_TABLE), beside, scratch: &scratch };
+        let Some(oracle) = run.outcome(None, &[]) else {
             endless.push(name);
             continue;
         };
@@ -73,6 +76,7 @@ fn programs_of_the_package_agree_with_rs274() {
             },
         }
     }
+    let _ = std::fs::remove_dir_all(&scratch);
     eprintln!(
         "{} programs compared, {} differ for a known reason, {} unexplained, {} without an end in rs274: {endless:?}",
         programs.len() - endless.len(),

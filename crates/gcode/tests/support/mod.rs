@@ -95,7 +95,8 @@ fn interpret(
 
 /// True if LinuxCNC's interpreter is installed.
 pub fn has_rs274() -> bool {
-    Command::new("rs274").arg("-h").output().is_ok()
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| folder.join("rs274").is_file())
 }
 
 /// The program as `rs274 -g` interprets it, with the subroutine files beside it; `None` if it does not end in time.
@@ -118,49 +119,58 @@ pub fn rs274_with(
         write(&directory.join(name), text.as_bytes());
     }
     let mut options: Vec<&OsStr> = Vec::new();
-    let (ini_path, path) = (directory.join("machine.ini"), directory.join("variables"));
+    let ini_path = directory.join("machine.ini");
     if let Some(ini) = ini {
         write(&ini_path, ini.as_bytes());
         options.extend([OsStr::new("-i"), ini_path.as_os_str()]);
     }
-    if let Some(variables) = variables {
-        write(&path, variables.as_bytes());
-        options.extend([OsStr::new("-v"), path.as_os_str()]);
-    }
-    let mut outcome = run_rs274(&file, &tools, directory, &options)?;
-    if variables.is_some() {
-        outcome.kept = kept(&std::fs::read(&path).expect("the parameter file"));
-    }
-    Some(outcome)
+    let run = Rs274 { program: &file, tools: &tools, beside: directory, scratch: directory };
+    run.outcome(variables, &options)
 }
 
-/// A program file as `rs274 -g` interprets it, run in `directory`; `None` if it does not end in time.
-pub fn rs274_file(program: &Path, tools: &Path, directory: &Path) -> Option<Outcome> {
-    run_rs274(program, tools, directory, &[])
+/// A program file, which stays where it is, for `rs274 -g`.
+pub struct Rs274<'a> {
+    pub program: &'a Path,
+    pub tools: &'a Path,
+    /// Where it looks for subroutine files.
+    pub beside: &'a Path,
+    /// Where it may write.
+    pub scratch: &'a Path,
 }
 
-fn run_rs274(program: &Path, tools: &Path, directory: &Path, options: &[&OsStr]) -> Option<Outcome> {
-    let output = Command::new("timeout")
-        .args(["10", "rs274"].map(OsStr::new))
-        .args(options)
-        // All that run share one map of the tools there; so each test has its own.
-        .env("HOME", directory)
-        .args([OsStr::new("-t"), tools.as_os_str(), OsStr::new("-g"), program.as_os_str()])
-        .current_dir(directory)
-        .output()
-        .expect("rs274 runs");
-    if output.status.code() == Some(124) {
-        return None;
+impl Rs274<'_> {
+    /// What it prints; `None` if it does not end in time.
+    pub fn outcome(&self, variables: Option<&str>, options: &[&OsStr]) -> Option<Outcome> {
+        // It always writes a parameter file, without `-v` to a folder of the system.
+        let path = self.scratch.join("variables");
+        match variables {
+            Some(variables) => write(&path, variables.as_bytes()),
+            None => drop(std::fs::remove_file(&path)),
+        }
+        let output = Command::new("timeout")
+            .args(["10", "rs274"].map(OsStr::new))
+            // All that run with one home share one map of the tools there.
+            .env("HOME", self.scratch)
+            .args([OsStr::new("-v"), path.as_os_str(), OsStr::new("-t"), self.tools.as_os_str()])
+            .args(options)
+            .args([OsStr::new("-g"), self.program.as_os_str()])
+            .current_dir(self.beside)
+            .output()
+            .expect("rs274 runs");
+        if output.status.code() == Some(124) {
+            return None;
+        }
+        let talk = text_of(&output.stderr);
+        let talk: Vec<&str> = talk.lines().collect();
+        let failed = !output.status.success();
+        let kept = variables.map(|_| kept(&std::fs::read(&path).expect("the parameter file")));
+        Some(Outcome {
+            lines: stream(&output.stdout),
+            failed_block: failed.then(|| talk.last().map(|line| line.to_string()).unwrap_or_default()),
+            message: if failed { talk[talk.len().saturating_sub(2)].to_string() } else { String::new() },
+            kept: kept.unwrap_or_default(),
+        })
     }
-    let talk = text_of(&output.stderr);
-    let talk: Vec<&str> = talk.lines().collect();
-    let failed = !output.status.success();
-    Some(Outcome {
-        lines: stream(&output.stdout),
-        failed_block: failed.then(|| talk.last().map(|line| line.to_string()).unwrap_or_default()),
-        message: if failed { talk[talk.len().saturating_sub(2)].to_string() } else { String::new() },
-        kept: Vec::new(),
-    })
 }
 
 #[allow(clippy::disallowed_methods)] // scratch files of a test need no atomic write

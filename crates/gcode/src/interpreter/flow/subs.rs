@@ -16,8 +16,18 @@ impl Interpreter {
         self.flow.subs.insert(word.name.label, Sub { span: word.span, line, body, style });
     }
 
-    fn wrong_style(&self, style: Style) -> bool {
-        self.flow.frames.last().is_some_and(|frame| frame.style != style)
+    /// Within a call only definitions of its own style are met.
+    fn check_style(&self, word: &OWord, style: Style) -> Result<(), Error> {
+        match self.flow.frames.last() {
+            Some(frame) if frame.style != style => Err(self.flow_error(ErrorKind::OStyle, word.span)),
+            _ => Ok(()),
+        }
+    }
+
+    /// The first line of a definition that is reached in order.
+    fn check_first_line(&self, word: &OWord, style: Style) -> Result<(), Error> {
+        self.nothing_more(word.operands)?;
+        self.check_style(word, style)
     }
 
     /// The definition that a call has searched for.
@@ -28,9 +38,7 @@ impl Interpreter {
         source: &mut dyn LineSource,
     ) -> Result<(), Error> {
         let style = if word.keyword.is_some() { Style::OWord } else { Style::Fanuc };
-        if self.wrong_style(style) {
-            return Err(self.flow_error(ErrorKind::OStyle, word.span));
-        }
+        self.check_style(word, style)?;
         let body = source.place();
         self.remember(word, here, body, style);
         if let Some(frame) = self.flow.frames.last_mut() {
@@ -48,10 +56,7 @@ impl Interpreter {
         here: Place,
         source: &mut dyn LineSource,
     ) -> Result<(), Error> {
-        self.nothing_more(word.operands)?;
-        if self.wrong_style(Style::Fanuc) {
-            return Err(self.flow_error(ErrorKind::OStyle, word.span));
-        }
+        self.check_first_line(word, Style::Fanuc)?;
         if self.state.settings.dialect == Dialect::Pkm {
             self.remember(word, here, source.place(), Style::Fanuc);
         }
@@ -66,10 +71,7 @@ impl Interpreter {
         here: Place,
         source: &mut dyn LineSource,
     ) -> Result<(), Error> {
-        self.nothing_more(word.operands)?;
-        if self.wrong_style(Style::OWord) {
-            return Err(self.flow_error(ErrorKind::OStyle, word.span));
-        }
+        self.check_first_line(word, Style::OWord)?;
         let dialect = self.state.settings.dialect;
         if !self.flow.frames.is_empty() {
             return match dialect {
