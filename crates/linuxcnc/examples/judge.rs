@@ -1,8 +1,9 @@
 //! The judge of a LinuxCNC session (`.ci/judge-linuxcnc` calls it):
 //!
-//! * `judge record MACHINE`: the HAL file that records every servo period;
+//! * `judge record MACHINE [steps]`: the HAL file that records every servo period (and the counts of LinuxCNC's `stepgen`);
 //! * `judge refuse MACHINE INI`: a program whose third line is out of reach, inside the axes' limits;
-//! * `judge rows MACHINE FOLDER`: whether `rows.csv` and `end.txt` of the session are what the machine file and `example.ngc` say.
+//! * `judge rows MACHINE FOLDER`: whether `rows.csv` and `end.txt` of the session are what the machine file and `example.ngc` say;
+//! * `judge sabotage MACHINE FOLDER`: whether it would say so of a session that is a little different. It must not.
 //!
 //! It knows the machine file and the program, and nothing of the module.
 #![allow(clippy::print_stdout)] // a command-line tool
@@ -17,7 +18,11 @@ fn main() -> Result<(), String> {
     let machine = |name: &str| Machine::load(name, &[]).map_err(|findings| format!("{findings:?}"));
     match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["record", name] => {
-            println!("{}", record(&machine(name)?));
+            println!("{}", record(&machine(name)?, false));
+            Ok(())
+        }
+        ["record", name, "steps"] => {
+            println!("{}", record(&machine(name)?, true));
             Ok(())
         }
         ["refuse", name, ini] => {
@@ -26,36 +31,48 @@ fn main() -> Result<(), String> {
             Ok(())
         }
         ["rows", name, folder] => {
-            let read = |file: &str| {
-                std::fs::read_to_string(format!("{folder}/{file}"))
-                    .map_err(|error| format!("{file}: {error}"))
-            };
-            let verdict =
-                judge(&machine(name)?, &read("rows.csv")?, &read("end.txt")?, &read("example.ngc")?)?;
-            println!("{name}: {verdict}");
+            let machine = machine(name)?;
+            println!("{name}: {}", judge(&machine, &Session::read(&machine, folder)?)?);
             Ok(())
         }
-        _ => Err("judge record MACHINE | refuse MACHINE INI | rows MACHINE FOLDER".into()),
+        ["sabotage", name, folder] => {
+            let machine = machine(name)?;
+            println!("{name}: {}", sabotage(&machine, &Session::read(&machine, folder)?)?);
+            Ok(())
+        }
+        _ => Err("judge record MACHINE [steps] | refuse MACHINE INI | rows MACHINE FOLDER | sabotage MACHINE FOLDER".into()),
     }
 }
 
-/// Joints, axes, line; the kinematics' type where it can be switched.
-fn record(machine: &Machine) -> String {
+/// Joints, axes, line; the kinematics' type where it can be switched; the counts of stepgen.
+fn record(machine: &Machine, steps: bool) -> String {
     let joints = machine.joints.len();
     let axes: Vec<Axis> = machine.mechanism.axes().iter().collect();
-    let switchable = !machine.switches.is_empty();
-    let types = "f".repeat(joints + axes.len()) + "s" + if switchable { "f" } else { "" };
+    let mut pins: Vec<(char, String, String)> = (0..joints)
+        .map(|joint| ('f', format!("record-joint-{joint}"), format!("joint.{joint}.pos-cmd")))
+        .collect();
+    for axis in &axes {
+        let letter = axis.letter().to_ascii_lowercase();
+        pins.push(('f', format!("record-{letter}"), format!("axis.{letter}.pos-cmd")));
+    }
+    pins.push(('s', "record-line".into(), "motion.program-line".into()));
+    // The signal is the configuration's own.
+    pins.push(('f', "kinematics-type".into(), String::new()));
+    if machine.switches.is_empty() {
+        pins.pop();
+    }
+    if steps {
+        pins.extend(
+            (0..joints)
+                .map(|joint| ('s', format!("record-counts-{joint}"), format!("stepgen.{joint}.counts"))),
+        );
+    }
+    let types: String = pins.iter().map(|(kind, ..)| *kind).collect();
     let mut t = format!(
         "loadrt sampler depth=16000 cfg={types}\naddf sampler.0 servo-thread\nsetp sampler.0.enable 0\n"
     );
-    let mut pins: Vec<String> = (0..joints).map(|joint| format!("joint.{joint}.pos-cmd")).collect();
-    pins.extend(axes.iter().map(|axis| format!("axis.{}.pos-cmd", axis.letter().to_ascii_lowercase())));
-    pins.push("motion.program-line".into());
-    for (index, pin) in pins.iter().enumerate() {
-        let _ = writeln!(t, "net record-{index} {pin} => sampler.0.pin.{index}");
-    }
-    if switchable {
-        let _ = writeln!(t, "net kinematics-type => sampler.0.pin.{}", pins.len());
+    for (index, (_, signal, pin)) in pins.iter().enumerate() {
+        let _ = writeln!(t, "net {signal} {pin} => sampler.0.pin.{index}");
     }
     t
 }
@@ -111,32 +128,64 @@ fn refuse(machine: &Machine, ini: &Ini) -> String {
 }
 
 /// One row of the record, in LinuxCNC's units.
+#[derive(Clone)]
 struct Row {
     joints: Joints,
     pose: [f64; 9],
     line: usize,
     kind: i32,
+    /// Of stepgen, if it ran.
+    counts: Option<Joints>,
 }
 
-fn rows(machine: &Machine, text: &str) -> Result<Vec<Row>, String> {
-    let axes: Vec<Axis> = machine.mechanism.axes().iter().collect();
-    let count = machine.joints.len();
-    text.lines()
-        .map(|line| {
-            let numbers: Vec<f64> =
-                line.split(',').map(str::parse).collect::<Result<_, _>>().map_err(|_| line.to_owned())?;
-            let mut row = Row { joints: [0.0; MAX_JOINTS], pose: [0.0; 9], line: 0, kind: 0 };
-            let (joints, rest) = numbers.split_at_checked(count).ok_or("a short row")?;
-            let (pose, rest) = rest.split_at_checked(axes.len()).ok_or("a short row")?;
-            row.joints[..count].copy_from_slice(joints);
-            for (axis, value) in axes.iter().zip(pose) {
-                row.pose[*axis as usize] = *value;
-            }
-            row.line = *rest.first().ok_or("a short row")? as usize;
-            row.kind = rest.get(1).map_or(0, |kind| *kind as i32);
-            Ok(row)
+/// What a session leaves.
+#[derive(Clone)]
+struct Session {
+    rows: Vec<Row>,
+    /// Where LinuxCNC's forward says that the machine rests.
+    end: [f64; 9],
+    program: String,
+}
+
+impl Session {
+    fn read(machine: &Machine, folder: &str) -> Result<Self, String> {
+        let read = |file: &str| {
+            std::fs::read_to_string(format!("{folder}/{file}")).map_err(|error| format!("{file}: {error}"))
+        };
+        let end: Vec<f64> =
+            read("end.txt")?.split_whitespace().filter_map(|number| number.parse().ok()).collect();
+        Ok(Self {
+            rows: read("rows.csv")?.lines().map(|line| row(machine, line)).collect::<Result<_, _>>()?,
+            end: end.try_into().map_err(|_| "end.txt is no pose")?,
+            program: read("example.ngc")?,
         })
-        .collect()
+    }
+}
+
+fn row(machine: &Machine, line: &str) -> Result<Row, String> {
+    let numbers: Vec<f64> =
+        line.split(',').map(str::parse).collect::<Result<_, _>>().map_err(|_| line.to_owned())?;
+    let mut numbers = numbers.into_iter();
+    let mut next = || numbers.next().ok_or("a short row");
+    let mut row = Row { joints: [0.0; MAX_JOINTS], pose: [0.0; 9], line: 0, kind: 0, counts: None };
+    let count = machine.joints.len();
+    for joint in &mut row.joints[..count] {
+        *joint = next()?;
+    }
+    for axis in machine.mechanism.axes().iter() {
+        row.pose[axis as usize] = next()?;
+    }
+    row.line = next()? as usize;
+    if !machine.switches.is_empty() {
+        row.kind = next()? as i32;
+    }
+    if let Ok(first) = next() {
+        let counts = row.counts.insert([first; MAX_JOINTS]);
+        for joint in &mut counts[1..count] {
+            *joint = next()?;
+        }
+    }
+    Ok(row)
 }
 
 /// The kinematics of each type, as LinuxCNC switches it.
@@ -242,9 +291,14 @@ fn blocks(program: &str) -> Vec<Block> {
 const ON_PATH: f64 = 1e-6;
 /// A block's ends are passed at most so far away: half a servo period's way.
 const AT_END: f64 = 0.06;
+/// LinuxCNC's forward of the joints at rest is at most so far from the axes, mm (degrees); where stepgen has the joints, so far.
+const AT_REST: f64 = 1e-6;
+const ONE_STEP: f64 = 0.02;
+/// Servo periods after which stepgen has arrived.
+const ARRIVED: usize = 50;
 
-fn judge(machine: &Machine, rows_text: &str, end: &str, program: &str) -> Result<String, String> {
-    let rows = rows(machine, rows_text)?;
+fn judge(machine: &Machine, session: &Session) -> Result<String, String> {
+    let Session { rows, end, program } = session;
     let (first, last) = (rows.first().ok_or("no rows")?, rows.last().ok_or("no rows")?);
     let count = machine.joints.len();
     let mut kinematics = Switching { machine, now: machine.mechanism, kind: 0 };
@@ -252,7 +306,7 @@ fn judge(machine: &Machine, rows_text: &str, end: &str, program: &str) -> Result
     let blocks = blocks(program);
 
     let mut solved: Vec<Joints> = Vec::with_capacity(rows.len());
-    let (mut exact, mut after_switch, mut since_switch) = (0_u64, 0_u64, usize::MAX);
+    let mut exact = 0_u64;
     let (mut most_back, mut most_off) = (0.0_f64, 0.0_f64);
     // Where the program has come: the start and the end of the block that is being run.
     let (mut start, mut here, mut block, mut last_row) = (first.pose, first.pose, None::<usize>, first.pose);
@@ -261,7 +315,6 @@ fn judge(machine: &Machine, rows_text: &str, end: &str, program: &str) -> Result
         if row.kind != kinematics.kind {
             let joints = solved.last().copied().unwrap_or(first.joints);
             kinematics.switch(row.kind, &joints);
-            since_switch = 0;
             (here, block) = (row.pose, None);
         }
         // (a) the filtered inverse, bit for bit
@@ -274,15 +327,11 @@ fn judge(machine: &Machine, rows_text: &str, end: &str, program: &str) -> Result
                 let seen = row.joints[joint];
                 if seen.to_bits() == expected.to_bits() || (seen == 0.0 && expected == 0.0) {
                     exact += 1;
-                } else if since_switch < 4 && (seen - expected).abs() < 1e-9 {
-                    // The pose after a switch comes from the joints, so they come back rounded.
-                    after_switch += 1;
                 } else {
                     return Err(format!("row {k}: joint {joint} is at {seen}, our inverse says {expected}"));
                 }
             }
         }
-        since_switch = since_switch.saturating_add(1);
         // (b) forward of the joints gives the axes
         let back = kinematics.forward(&joints, &row.pose).map_err(|error| format!("row {k}: {error}"))?;
         most_back = most_back.max(distance(&back, &row.pose));
@@ -331,17 +380,117 @@ fn judge(machine: &Machine, rows_text: &str, end: &str, program: &str) -> Result
     if most_back > 1e-6 {
         return Err(format!("forward of the joints is {most_back} mm from the axes"));
     }
-    let end: Vec<f64> = end.split_whitespace().filter_map(|number| number.parse().ok()).collect();
-    let end: [f64; 9] = end.try_into().map_err(|_| "end.txt is no pose")?;
-    if distance(&end, &last.pose) > 1e-6 {
+    let (steps, rest) = match rows.iter().any(|row| row.counts.is_some()) {
+        true => (steps(machine, rows)?, ONE_STEP),
+        false => (String::new(), AT_REST),
+    };
+    if !(distance(end, &last.pose) <= rest) {
         return Err(format!("LinuxCNC's forward says {end:?}, the axes are at {:?}", last.pose));
     }
     Ok(format!(
-        "{} rows, {exact} joint positions bit for bit, {after_switch} within 1e-9 beside a switch; forward within {most_back:.0e} mm; \
-         {} blocks, path within {most_off:.0e} mm",
+        "{} rows, {exact} joint positions bit for bit, forward within {most_back:.0e} mm; \
+         {} blocks, path within {most_off:.0e} mm{steps}",
         rows.len(),
         blocks.len()
     ))
+}
+
+/// (e) Wherever the joints have rested a while, stepgen's counts are their ways in steps, to the half of one.
+fn steps(machine: &Machine, rows: &[Row]) -> Result<String, String> {
+    let Some(Row { joints: home, counts: Some(zero), .. }) = rows.first() else {
+        return Err("no counts".into());
+    };
+    let (mut places, mut most, mut farthest, mut rested) = (0, 0.0_f64, 0.0_f64, 0);
+    for (k, pair) in rows.windows(2).enumerate() {
+        let (before, Row { joints, counts: Some(counts), .. }) = (&pair[0], &pair[1]) else {
+            return Err(format!("row {}: no counts", k + 1));
+        };
+        rested = if before.joints == *joints { rested + 1 } else { 0 };
+        if rested != ARRIVED {
+            continue;
+        }
+        places += 1;
+        for (number, joint) in machine.joints.iter().enumerate() {
+            let per_unit = joint.to_face(1.0);
+            let scale = joint.steps_per_unit / per_unit;
+            let way = (joints[number] - home[number]) * scale;
+            let off = (counts[number] - zero[number] - way).abs();
+            (most, farthest) = (most.max(off), farthest.max(way.abs()));
+            if !(off <= 0.5 + 1e-3) {
+                return Err(format!(
+                    "row {}: joint {number} has made {} steps, not {way:.3}",
+                    k + 1,
+                    counts[number]
+                ));
+            }
+        }
+    }
+    if places < 10 || farthest < 1000.0 {
+        return Err(format!("{places} rests, {farthest:.0} steps: too little to count"));
+    }
+    Ok(format!("; stepgen within {most:.2} steps at {places} rests, up to {farthest:.0} steps away"))
+}
+
+/// The judge must be able to convict: each of these sessions is a little different from the one that happened.
+fn sabotage(machine: &Machine, session: &Session) -> Result<String, String> {
+    judge(machine, session)?;
+    let middle = session.rows.len() / 2;
+    // In the middle of a move, away from a switch.
+    let moving = (middle..session.rows.len())
+        .find(|&k| {
+            session.rows[k - 8..k + 8]
+                .windows(2)
+                .all(|pair| pair[0].pose != pair[1].pose && pair[0].kind == pair[1].kind)
+        })
+        .ok_or("nothing moves")?;
+    let row = &session.rows[moving];
+    let axis =
+        (0..9).find(|&axis| row.pose[axis] != session.rows[moving - 1].pose[axis]).ok_or("nothing moves")?;
+    let mut convicted = 0;
+    let mut convict = |what: &str, because: &str, change: &dyn Fn(&mut Session)| {
+        let mut other = session.clone();
+        change(&mut other);
+        match judge(machine, &other) {
+            Err(why) if why.contains(because) => convicted += 1,
+            verdict => return Err(format!("{what}: should be convicted because \"{because}\": {verdict:?}")),
+        }
+        Ok(())
+    };
+    for joint in 0..machine.joints.len() {
+        convict("a joint is moved by 1e-9 in one period", "our inverse says", &|s| {
+            s.rows[moving].joints[joint] += 1e-9
+        })?;
+    }
+    convict("the axes are moved by 1e-5 in one period", "row", &|s| s.rows[moving].pose[axis] += 1e-5)?;
+    convict("one period is missing", "our inverse says", &|s| {
+        s.rows.remove(moving);
+    })?;
+    convict("two periods are the wrong way round", "our inverse says", &|s| s.rows.swap(moving, moving + 1))?;
+    convict("the record ends too early", "the program ended", &|s| s.rows.truncate(moving))?;
+    convict("a block is not run", "of", &|s| s.program.push_str("G1 X0.001\n"))?;
+    convict("the program says another place", "line", &|s| {
+        s.program = s.program.replace("\nG1 X", "\nG1 X1")
+    })?;
+    if session.program.contains(" I-") {
+        convict("an arc has another centre", "line", &|s| s.program = s.program.replace(" I-", " I-1"))?;
+    }
+    convict("a block is run again", "line", &|s| {
+        let line = blocks(&s.program)[0].line;
+        s.rows[moving..].iter_mut().for_each(|row| row.line = line);
+    })?;
+    convict("the machine rests elsewhere", "LinuxCNC's forward", &|s| {
+        s.end[axis] += 1.5 * if s.rows[0].counts.is_some() { ONE_STEP } else { AT_REST }
+    })?;
+    convict("nobody knows where it rests", "LinuxCNC's forward", &|s| s.end[axis] = f64::NAN)?;
+    if row.counts.is_some() {
+        convict("one step is lost", "steps, not", &|s| {
+            s.rows[moving..]
+                .iter_mut()
+                .filter_map(|row| row.counts.as_mut())
+                .for_each(|counts| counts[0] += 1.0)
+        })?;
+    }
+    Ok(format!("{convicted} falsified records convicted"))
 }
 
 /// Distance from the straight line or arc of a block.
