@@ -297,17 +297,20 @@ impl Kinematics for Hexapod {
         ("", crate::machine::number(joint))
     }
 
+    /// Two struts at a time, as [`Self::motion`].
     fn inverse(&self, pose: &Pose) -> Result<Joints, InverseError> {
         Self::finite(pose)?;
         let at = Attitude::of(pose);
-        let mut joints = [0.0; MAX_JOINTS];
-        for (((joint, a), b), number) in joints.iter_mut().zip(&self.platform).zip(&self.base).zip(0u8..) {
-            *joint = norm(sub(add([pose.x, pose.y, pose.z], at.rotate(*a)), *b));
-            if !(*joint > 1e-9) {
-                return Err(InverseError::ZeroStrut { joint: number });
-            }
+        let mut all = [0.0; MAX_JOINTS];
+        let ends = self.platform.as_chunks().0.iter().zip(self.base.as_chunks().0);
+        for (((points, bases), lengths), joints) in
+            ends.zip(all.as_chunks_mut().0).zip([[0, 1], [2, 3], [4, 5]])
+        {
+            let (_, d) = pair::strut(&at, pose, points, bases);
+            *lengths = sqrt_2(pair::dot(d, d));
+            positive(*lengths, joints)?;
         }
-        Ok(joints)
+        Ok(all)
     }
 
     /// Newton. Assumes the seed lies in the assembly wanted; guarantees residuals below 1e-10 mm (plus rounding of the lengths)
@@ -408,14 +411,9 @@ impl Kinematics for Hexapod {
         let seconds = motion.acceleration.as_chunks_mut().0.iter_mut();
         let struts = platform.zip(self.base.as_chunks().0).zip(lengths).zip(rates).zip(seconds);
         for (((((points, bases), length), rate), second), joints) in struts.zip([[0, 1], [2, 3], [4, 5]]) {
-            let arm = pair::rotate(&at, pair::of(points));
-            let d = pair::sub(pair::add(pair::both([pose.x, pose.y, pose.z]), arm), pair::of(bases));
+            let (arm, d) = pair::strut(&at, pose, points, bases);
             *length = sqrt_2(pair::dot(d, d));
-            for (length, joint) in length.iter().zip(joints) {
-                if !(*length > 1e-9) {
-                    return Err(InverseError::ZeroStrut { joint });
-                }
-            }
+            positive(*length, joints)?;
             let unit = pair::scale([1.0 / length[0], 1.0 / length[1]], d);
             let turn = pair::cross(pair::both(omega), arm);
             let d_v = pair::add(pair::both([v.x, v.y, v.z]), turn);
@@ -431,6 +429,15 @@ impl Kinematics for Hexapod {
         if v.is_finite() && a.is_finite() { Ok(motion) } else { Err(InverseError::NotFinite) }
     }
 
+    fn passage(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<Joints, InverseError> {
+        let joints = self.inverse(pose)?;
+        if velocity.is_finite() && acceleration.is_finite() {
+            Ok(joints)
+        } else {
+            Err(InverseError::NotFinite)
+        }
+    }
+
     fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
         let (_, struts) = self.reach(pose)?;
         let forward = reciprocal_condition(&self.scaled_rows(&struts));
@@ -438,10 +445,22 @@ impl Kinematics for Hexapod {
     }
 }
 
+/// Two struts with a length.
+#[inline]
+fn positive(lengths: [f64; 2], joints: [u8; 2]) -> Result<(), InverseError> {
+    for (length, joint) in lengths.iter().zip(joints) {
+        if !(*length > 1e-9) {
+            return Err(InverseError::ZeroStrut { joint });
+        }
+    }
+    Ok(())
+}
+
 /// Vectors of two struts side by side, so that the processor can do both at once. Every function does with each of the two what
 /// its namesake in [`crate::vector`] does with one: the same bits.
 mod pair {
     use crate::attitude::Attitude;
+    use crate::pose::Pose;
     use crate::vector::Vec3;
 
     type Two = [f64; 2];
@@ -503,6 +522,13 @@ mod pair {
     pub(super) fn cross([ux, uy, uz]: Pair, [vx, vy, vz]: Pair) -> Pair {
         let minor = |a: Two, b: Two, c: Two, d: Two| minus(times(a, b), times(c, d));
         [minor(uy, vz, uz, vy), minor(uz, vx, ux, vz), minor(ux, vy, uy, vx)]
+    }
+
+    /// R a and the way from base to platform, p + R a − b.
+    #[inline]
+    pub(super) fn strut(at: &Attitude, pose: &Pose, points: &[Vec3; 2], bases: &[Vec3; 2]) -> (Pair, Pair) {
+        let arm = rotate(at, of(points));
+        (arm, sub(add(both([pose.x, pose.y, pose.z]), arm), of(bases)))
     }
 
     /// As [`Attitude::rotate`].

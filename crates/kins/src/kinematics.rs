@@ -236,6 +236,19 @@ pub trait Kinematics {
     /// As [`Self::jacobian`].
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError>;
 
+    /// The joints at `pose` if nothing is in the way of a motion through it: what [`Self::motion`] answers and refuses,
+    /// without the derivatives. For looking along a path.
+    ///
+    /// # Errors
+    /// As [`Self::motion`].
+    #[inline]
+    fn passage(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<Joints, InverseError> {
+        match self.motion(pose, velocity, acceleration) {
+            Ok(motion) => Ok(motion.position),
+            Err(error) => Err(error),
+        }
+    }
+
     /// Distance from singularities at a reachable pose.
     ///
     /// # Errors

@@ -87,6 +87,10 @@ macro_rules! mechanisms {
             fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
                 match self { $(Self::$name(m) => Kinematics::motion(m, pose, velocity, acceleration)),+ }
             }
+            #[inline]
+            fn passage(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<Joints, InverseError> {
+                match self { $(Self::$name(m) => Kinematics::passage(m, pose, velocity, acceleration)),+ }
+            }
             fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
                 match self { $(Self::$name(m) => Kinematics::singularity(m, pose)),+ }
             }

@@ -166,6 +166,35 @@ fn writing_in_place_is_the_same() {
     assert!(unreachable.into_inner() > 0 && impossible.into_inner() > 0, "nothing was refused");
 }
 
+/// Looking along a path asks for the joints only, and is refused what a motion is refused, for the same reason.
+#[test]
+fn a_passage_answers_and_refuses_what_a_motion_does() {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    let (passed, refused) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    for_all("passage", |case, rng, count| {
+        let m = &case.mechanism;
+        for _ in 0..count {
+            let pose = case.any_pose(rng);
+            // Any axis may move, locked ones too; now and then one that has no speed.
+            let mut any = || {
+                Pose::from_array(std::array::from_fn(|_| match rng.below(40) {
+                    0 => f64::NAN,
+                    1..20 => 0.0,
+                    _ => rng.between(-1.0, 1.0),
+                }))
+            };
+            let (velocity, acceleration) = (any(), any());
+            let bits = |joints: Joints| joints.map(f64::to_bits);
+            let expected = m.motion(&pose, &velocity, &acceleration).map(|motion| bits(motion.position));
+            let found = m.passage(&pose, &velocity, &acceleration).map(bits);
+            assert_eq!(found, expected, "{pose:?} {velocity:?} {acceleration:?}");
+            let counter = if found.is_ok() { &passed } else { &refused };
+            counter.fetch_add(1, Ordering::Relaxed);
+        }
+    });
+    assert!(passed.into_inner() > 0 && refused.into_inner() > 0);
+}
+
 #[test]
 fn round_trip_from_joints() {
     for_all("joints", |case, rng, count| {

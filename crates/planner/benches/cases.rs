@@ -224,7 +224,7 @@ fn run<const R: usize>(known: &Known, clock_ns: f64) -> Run {
 fn run_any(known: &Known, clock_ns: f64) -> Run {
     match known.case.mechanism.joint_count() {
         2 => run::<2>(known, clock_ns),
-        3 => run::<3>(known, clock_ns),
+        3 => run::<4>(known, clock_ns),
         _ => run::<6>(known, clock_ns),
     }
 }

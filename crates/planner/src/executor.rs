@@ -2,12 +2,13 @@
 //! look-ahead permits, and keeps that acceleration until the next node. Feed hold, overrides and abort only change
 //! what is permitted; the strips hold in every one of them, on the path.
 
-use crate::PlanError;
 use crate::grid::Node;
 use crate::interval::{accelerations, exits};
 use crate::limits::{Rows, Sample};
 use crate::operator::Panel;
+use crate::pair::{each, higher, highest, with};
 use crate::planner::{PathMode, Planner, Setpoint, State};
+use crate::{PlanError, PlanErrorKind};
 use pkm_kins::{Kinematics, Pose, maths::sqrt};
 
 /// Nodes passed in one tick at the very most (the grid holds the speed down to about 128).
@@ -20,7 +21,7 @@ struct Leg {
     x: f64,
 }
 
-/// Up, along, down.
+/// Down, along, up: the one driven now is the last.
 type Legs = heapless::Vec<Leg, 3>;
 
 /// Where the machine is between the two nodes at the front, and what it is doing there.
@@ -30,7 +31,7 @@ pub(crate) struct Executor {
     sigma: f64,
     /// ṡ² here.
     x: f64,
-    /// The legs still to be driven to the next node, the present one first.
+    /// The legs still to be driven to the next node.
     legs: Legs,
     planned: bool,
     /// Number of the next setpoint within its servo period, from 0.
@@ -184,7 +185,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let (rows, panel) = (self.limits.rows(), self.executor.panel);
         let Some(front) = self.nodes.front() else { return false };
         // The interval being driven counts as driven.
-        let mut x = self.executor.legs.last().map_or(self.executor.x, |leg| leg.x);
+        let mut x = self.executor.legs.first().map_or(self.executor.x, |leg| leg.x);
         let here = front.distance + self.executor.sigma;
         let share = self.grid.share(1, panel);
         let known = self.nodes.iter().skip(1);
@@ -227,30 +228,33 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                         }
                         continue;
                     }
-                }
-                if !self.plan_leg(held) {
+                    self.executor.legs.clear();
+                    let _ = self.executor.legs.push(Leg { end: length, x: x_end });
+                    self.executor.planned = true;
+                } else if !self.plan_leg(held) {
                     return true;
                 }
             }
             let e = &mut self.executor;
-            let Some(&leg) = e.legs.first() else { return true };
+            let Some(&leg) = e.legs.last() else { return true };
             let distance = leg.end - e.sigma;
             let (v, v_end) = (sqrt(e.x), sqrt(leg.x));
             let duration = if v + v_end > 0.0 { 2.0 * distance / (v + v_end) } else { f64::INFINITY };
-            let acceleration = (leg.x - e.x) / (2.0 * distance);
-            let speed = v + acceleration * remaining;
-            // Braking to rest may seem to end just before the leg does; that is rounding, and the leg is over.
-            let arrived = duration <= remaining || leg.x == 0.0 && v > 0.0 && !(speed > 0.0);
-            if !arrived {
-                if distance > 0.0 && duration.is_finite() {
-                    e.sigma = (e.sigma + 0.5 * (v + speed) * remaining).min(leg.end);
-                    e.x = speed * speed;
+            if !(duration <= remaining) {
+                let speed = v + (leg.x - e.x) / (2.0 * distance) * remaining;
+                // Braking to rest may seem to end just before the leg does; that is rounding, and the leg is over.
+                let arrived = leg.x == 0.0 && v > 0.0 && !(speed > 0.0);
+                if !arrived {
+                    if distance > 0.0 && duration.is_finite() {
+                        e.sigma = (e.sigma + 0.5 * (v + speed) * remaining).min(leg.end);
+                        e.x = speed * speed;
+                    }
+                    return false;
                 }
-                return false;
             }
             remaining = (remaining - duration).max(0.0);
             e.x = leg.x;
-            e.legs.remove(0);
+            e.legs.pop();
             if leg.end < length {
                 e.sigma = leg.end;
                 if e.x == 0.0 && held {
@@ -272,8 +276,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     /// True at rest at the front node. Where the plan says rest, what is left of the speed is rounding.
     fn stops_here(&mut self) -> bool {
         const REST_MM: f64 = 1e-9;
-        let in_a_period = sqrt(self.executor.x) * self.settings.servo_period_s;
-        let single = self.executor.panel.single_block && in_a_period <= REST_MM;
+        let single = self.executor.panel.single_block
+            && sqrt(self.executor.x) * self.settings.servo_period_s <= REST_MM;
         let stops = self.nodes.front().is_some_and(|node| node.stop || single && node.blocks > 0);
         if stops {
             self.executor.x = 0.0;
@@ -300,20 +304,17 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let (Some(node), Some(next)) = (self.nodes.front(), self.nodes.get(1)) else { return false };
         let (sigma, x) = (self.executor.sigma, self.executor.x);
         let length = node.length - sigma;
-        let anew = self.piece(node.piece).filter(|_| sigma > 0.0).and_then(|piece| {
-            let mut sample = Sample::EMPTY;
-            self.limits.sample(&self.kinematics, piece, node.s + sigma, &mut sample).ok().map(|()| sample)
-        });
-        let here = anew.as_ref().map_or(&node.right, |sample| &sample.rows);
+        let anew = if sigma > 0.0 { self.strips_at(node.piece, node.s + sigma) } else { None };
+        let here = anew.as_ref().unwrap_or(&node.right);
         let panel = self.executor.panel;
         // What is being driven, if it leads to the node (a braking leg may end before).
         let running =
-            self.executor.legs.last().filter(|leg| sigma > 0.0 && leg.end >= node.length).map(|leg| leg.x);
+            self.executor.legs.first().filter(|leg| sigma > 0.0 && leg.end >= node.length).map(|leg| leg.x);
         let mut legs = Legs::new();
         let mut add = |end: f64, x: f64| {
             // The end of the interval is the node itself, not a sum.
             let end = if end < length { sigma + end } else { node.length };
-            let _ = legs.push(Leg { end, x: x.max(0.0) });
+            let _ = legs.push(Leg { end, x: higher(0.0, x) });
         };
         if held {
             if x == 0.0 {
@@ -343,23 +344,31 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 if free && !brief { faster(here, &next.left, rows, length, x, x_end, cap) } else { None };
             match shape {
                 Some((up, along, peak)) => {
-                    if up > 0.0 {
-                        add(up, peak);
+                    if along < length {
+                        add(length, x_end);
                     }
                     if along > up {
                         add(along, peak);
                     }
+                    if up > 0.0 {
+                        add(up, peak);
+                    }
                 }
                 None if x == 0.0 && x_end == 0.0 => return false,
-                None => {}
-            }
-            if legs_end(&legs) < node.length {
-                let _ = legs.push(Leg { end: node.length, x: x_end.max(0.0) });
+                None => add(length, x_end),
             }
         }
         self.executor.legs = legs;
         self.executor.planned = true;
         true
+    }
+
+    /// The strips at a place between two nodes.
+    #[inline(never)]
+    fn strips_at(&self, piece: u64, s: f64) -> Option<Rows<R>> {
+        let mut sample = Sample::EMPTY;
+        self.limits.sample(&self.kinematics, self.piece(piece)?, s, &mut sample).ok()?;
+        Some(sample.rows)
     }
 
     /// The x at which node `index` may be passed under the overrides of now.
@@ -400,9 +409,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let speed = sqrt(self.executor.x);
         let pose = Pose::from_array(point.position);
         let velocity = Pose::from_array(point.first.map(|d| d * speed));
-        let motion = self.kinematics.motion(&pose, &velocity, &Pose::ZERO);
-        let motion = motion.map_err(|e| PlanError {
-            kind: crate::PlanErrorKind::Unreachable(e),
+        let motion = &self.kinematics.motion(&pose, &velocity, &Pose::ZERO);
+        let motion = motion.as_ref().map_err(|&error| PlanError {
+            kind: PlanErrorKind::Unreachable(error),
             span: piece.span,
             pose,
         })?;
@@ -445,10 +454,6 @@ fn braking<const R: usize>(
     if hardest > needed { (x / (2.0 * hardest), 0.0) } else { (length, 0.0) }
 }
 
-fn legs_end(legs: &Legs) -> f64 {
-    legs.last().map_or(0.0, |leg| leg.end)
-}
-
 /// The fastest way through an interval entered with `x` and left with `x_end`: up to a peak (or the cap), along it, down
 /// again. Returns where the first two legs end and the peak, or `None` where one acceleration throughout is as fast.
 fn faster<const R: usize>(
@@ -470,9 +475,12 @@ fn faster<const R: usize>(
         let peak = (2.0 * length + x / up - x_end / down) / (1.0 / up - 1.0 / down);
         (down < 0.0 && up > 0.0).then_some((peak.min(cap), up, -down))
     };
-    let (first, ..) = meet(cap)?;
-    let (second, ..) = meet(first.max(top))?;
-    let (peak, up, down) = meet(second.max(top))?;
+    let (mut peak, mut up, mut down) = meet(cap)?;
+    // At the cap it is what it was computed for.
+    if peak < cap {
+        let (second, ..) = meet(higher(peak, top))?;
+        (peak, up, down) = meet(higher(second, top))?;
+    }
     // Not worth a change of acceleration.
     if !(peak >= top) || !(peak - bottom > 1e-9 * peak) {
         return None;
@@ -484,6 +492,6 @@ fn faster<const R: usize>(
 
 /// The x at which holding the speed alone takes some joint to its acceleration limit.
 fn hardest_bend<const R: usize>(here: &Rows<R>, next: &Rows<R>, rows: usize) -> f64 {
-    let bend = |side: &Rows<R>| side.second.iter().take(rows).fold(0.0_f64, |worst, q| worst.max(q.abs()));
-    1.0 / bend(here).max(bend(next))
+    let bends = here.pairs(rows).chain(next.pairs(rows)).map(|(_, q)| q);
+    1.0 / highest(bends.fold([0.0; 2], |worst, q| with(worst, each(q, f64::abs), higher)))
 }

@@ -4,22 +4,30 @@
 //! both ends are then linear in (x, x′). The set they allow is convex and holds (0, 0): stopping is always possible.
 
 use crate::limits::Rows;
+use crate::pair::{Pair, each, higher, highest, lower, lowest, with};
 
-/// Calls `each` with a and b of every strip |a·x + b·x′| ≤ h, where h = 2 Δs.
+/// Calls `look` with a and b of every strip |a·x + b·x′| ≤ h, where h = 2 Δs; two rows at a time.
 #[inline(always)]
 fn borders<const R: usize>(
     left: &Rows<R>,
     right: &Rows<R>,
     rows: usize,
     h: f64,
-    mut each: impl FnMut(f64, f64),
+    mut look: impl FnMut(Pair, Pair),
 ) {
-    for (p, q) in left.first.iter().zip(&left.second).take(rows) {
-        each(h * q - p, *p);
+    for (p, q) in left.pairs(rows) {
+        look(with(p, q, |p, q| h * q - p), p);
     }
-    for (p, q) in right.first.iter().zip(&right.second).take(rows) {
-        each(-p, p + h * q);
+    for (p, q) in right.pairs(rows) {
+        look(each(p, |p| -p), with(p, q, |p, q| p + h * q));
     }
+}
+
+/// A pair of borders x′ = slope·x ± half.
+#[derive(Clone, Copy)]
+struct Lines {
+    slope: Pair,
+    half: Pair,
 }
 
 /// The largest x ≤ `cap` from which some x′ ≤ `next_cap` can be reached within all strips.
@@ -40,52 +48,64 @@ pub(crate) fn fastest_entry<const R: usize>(
     let mut x = cap;
     // As a rule the highest x′ asked for is the one.
     let reached = |x: f64| {
-        let mut widest = 0.0_f64;
-        borders(left, right, rows, h, |a, b| widest = widest.max((a * x + b * next_cap).abs()));
-        widest <= h * (1.0 + 1e-12)
+        let mut widest = [0.0; 2];
+        borders(left, right, rows, h, |a, b| {
+            widest = with(widest, with(a, b, |a, b| (a * x + b * next_cap).abs()), higher);
+        });
+        highest(widest) <= h * (1.0 + 1e-12)
     };
     if reached(x) {
         return x;
     }
-    // The borders as lines x′ = slope·x ± half. One that is all but upright does not care for x′: as a line it would be
-    // the difference of two huge numbers.
+    // The borders as lines. One that is all but upright does not care for x′: as a line it would be the difference of two
+    // huge numbers.
     const UPRIGHT: f64 = 1e-9;
     let mut upright = f64::INFINITY;
-    let mut lines = [[(0.0, f64::INFINITY); 2]; R];
-    for (row, slot) in lines.iter_mut().enumerate().take(rows) {
-        let (p, q) = (left.first[row], left.second[row]);
-        let (p_end, q_end) = (right.first[row], right.second[row]);
-        for (slot, (a, b)) in slot.iter_mut().zip([(h * q - p, p), (-p_end, p_end + h * q_end)]) {
-            if b.abs() * next_cap <= UPRIGHT * h {
-                upright = upright.min(h / a.abs());
-            } else {
-                let part = 1.0 / b;
-                *slot = (-a * part, h * part.abs());
+    const NONE: Lines = Lines { slope: [0.0; 2], half: [f64::INFINITY; 2] };
+    let mut lines = [NONE; R];
+    let mut slots = lines.iter_mut();
+    borders(left, right, rows, h, |a, b| {
+        let Some(slot) = slots.next() else { return };
+        let part = each(b, |b| 1.0 / b);
+        slot.slope = with(a, part, |a, part| -a * part);
+        slot.half = each(part, |part| h * part.abs());
+        let is_upright = |k: usize| b[k].abs() * next_cap <= UPRIGHT * h;
+        if is_upright(0) || is_upright(1) {
+            for k in [0, 1] {
+                if is_upright(k) {
+                    upright = lower(upright, h / a[k].abs());
+                    (slot.slope[k], slot.half[k]) = (0.0, f64::INFINITY);
+                }
             }
         }
-    }
+    });
     // Every step leaves at least one of the 4·rows + 2 borders behind for good.
     for _ in 0..4 * R + 2 {
         // Highest and lowest x′ at x, and where the same borders are at 0.
-        let (mut low, mut high) = (0.0, next_cap);
-        let (mut low_at_0, mut high_at_0) = (0.0, next_cap);
-        for &(slope, half) in lines.iter().take(rows).flatten() {
-            let middle = slope * x;
-            if middle - half > low {
-                (low, low_at_0) = (middle - half, -half);
-            }
-            if middle + half < high {
-                (high, high_at_0) = (middle + half, half);
+        let (mut low, mut high) = ([0.0; 2], [next_cap; 2]);
+        let (mut low_at_0, mut high_at_0) = ([0.0; 2], [next_cap; 2]);
+        for line in lines.iter().take(2 * rows.div_ceil(2)) {
+            for k in [0, 1] {
+                let (middle, half) = (line.slope[k] * x, line.half[k]);
+                let (bottom, top) = (middle - half, middle + half);
+                let (above, below) = (bottom > low[k], top < high[k]);
+                low[k] = if above { bottom } else { low[k] };
+                low_at_0[k] = if above { -half } else { low_at_0[k] };
+                high[k] = if below { top } else { high[k] };
+                high_at_0[k] = if below { half } else { high_at_0[k] };
             }
         }
+        let (low, low_at_0) = if low[1] > low[0] { (low[1], low_at_0[1]) } else { (low[0], low_at_0[0]) };
+        let (high, high_at_0) =
+            if high[1] < high[0] { (high[1], high_at_0[1]) } else { (high[0], high_at_0[0]) };
         // The gap between the two is open at 0 and, where it is closed at x, closes in between.
         let (gap, gap_at_0) = (high - low, high_at_0 - low_at_0);
-        let next = if gap >= 0.0 { x } else { x * (gap_at_0 / (gap_at_0 - gap)) }.min(upright);
+        let next = lower(if gap >= 0.0 { x } else { x * (gap_at_0 / (gap_at_0 - gap)) }, upright);
         // What is left of the way is rounding.
         if !(next < x * (1.0 - 1e-14)) {
-            return x.min(next);
+            return lower(x, next);
         }
-        x = next.max(0.0);
+        x = higher(0.0, next);
         if reached(x) {
             return x;
         }
@@ -105,17 +125,17 @@ pub(crate) fn exits<const R: usize>(
     // Where a joint's q′ passes zero, b is all rounding and so is the room at the limit: without a little slack their
     // quotient is anything.
     const SLACK: f64 = 1e-9;
-    let (mut low, mut high) = (0.0_f64, f64::INFINITY);
+    let (mut low, mut high) = ([0.0; 2], [f64::INFINITY; 2]);
     let h = 2.0 * length;
     borders(left, right, rows, h, |a, b| {
-        if b != 0.0 {
-            let part = 1.0 / b;
-            let (middle, half) = (-a * x * part, h * (1.0 + SLACK) * part.abs());
-            high = high.min(middle + half);
-            low = low.max(middle - half);
-        }
+        // Where b is 0, what comes out is infinite or no number, and asks for nothing.
+        let part = each(b, |b| 1.0 / b);
+        let middle = with(a, part, |a, part| -a * x * part);
+        let half = each(part, |part| h * (1.0 + SLACK) * part.abs());
+        high = with(high, with(middle, half, |middle, half| middle + half), lower);
+        low = with(low, with(middle, half, |middle, half| middle - half), higher);
     });
-    (low, high)
+    (highest(low), lowest(high))
 }
 
 /// The accelerations that the strips at both ends allow for every x from `x_low` to `x_high`: (hardest braking,
@@ -127,19 +147,21 @@ pub(crate) fn accelerations<const R: usize>(
     x_low: f64,
     x_high: f64,
 ) -> (f64, f64) {
-    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    let (mut low, mut high) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
     for side in [left, right] {
-        for (p, q) in side.first.iter().zip(&side.second).take(rows) {
+        for (p, q) in side.pairs(rows) {
             // |p a + q x| ≤ 1 at both x.
-            let (p, q) = if *p >= 0.0 { (*p, *q) } else { (-p, -q) };
-            let (at_low, at_high) = (q * x_low, q * x_high);
-            if p > 0.0 {
-                high = high.min((1.0 - at_low.max(at_high)) / p);
-                low = low.max((-1.0 - at_low.min(at_high)) / p);
-            }
+            let q = with(p, q, |p, q| if p >= 0.0 { q } else { -q });
+            let p = each(p, f64::abs);
+            let (at_low, at_high) = (each(q, |q| q * x_low), each(q, |q| q * x_high));
+            let most = with(with(at_low, at_high, higher), p, |most, p| (1.0 - most) / p);
+            let least = with(with(at_low, at_high, lower), p, |least, p| (-1.0 - least) / p);
+            high = with(high, with(most, p, |most, p| if p > 0.0 { most } else { f64::INFINITY }), lower);
+            low =
+                with(low, with(least, p, |least, p| if p > 0.0 { least } else { f64::NEG_INFINITY }), higher);
         }
     }
-    (low, high)
+    (highest(low), lowest(high))
 }
 
 #[cfg(test)]
@@ -175,10 +197,14 @@ mod tests {
     fn fastest_entry_is_the_optimum() {
         let mut seed = 0x1234_5678_9abc_def1;
         for case in 0..2000 {
-            let rows: [Rows<3>; 2] = core::array::from_fn(|_| Rows {
-                first: core::array::from_fn(|_| next(&mut seed)),
-                second: core::array::from_fn(|_| next(&mut seed) * 0.3),
-            });
+            // Three rows: the second pair is half empty.
+            let mut values = |size: f64| {
+                let mut three = [0.0; 4];
+                three[..3].fill_with(|| next(&mut seed) * size);
+                three
+            };
+            let rows: [Rows<4>; 2] =
+                core::array::from_fn(|_| Rows { first: values(1.0), second: values(0.3) });
             let (length, cap, next_cap) =
                 (1.0 + next(&mut seed).abs(), 5.0 + next(&mut seed), 4.0 * next(&mut seed).abs());
             let got = fastest_entry(&rows[0], &rows[1], 3, length, cap, next_cap);

@@ -21,6 +21,7 @@ mod jerk;
 mod limits;
 mod merge;
 mod operator;
+mod pair;
 pub mod path;
 mod planner;
 mod switch;

@@ -4,6 +4,7 @@
 //! x = ṡ², its speed is |q′|√x and its acceleration q′ s̈ + q″ x. Rows are stored divided by their acceleration
 //! limit, so each asks for |d₁ s̈ + d₂ x| ≤ 1. (Bobrow, Dubowsky, Gibson 1985; Pham & Pham, TOPP-RA, 2018.)
 
+use crate::pair::{Pair, higher, highest, lower, lowest, with};
 use crate::path::{FeedGroup, feed_length};
 use crate::planner::Piece;
 use crate::{PlanError, PlanErrorKind};
@@ -40,7 +41,7 @@ pub struct AxisLimits {
     pub max_acceleration: f64,
 }
 
-/// All limits of a machine with at most `R` rows (joints + limited axes).
+/// All limits of a machine with at most `R` rows (joints + limited axes); `R` is even.
 #[derive(Debug, Clone)]
 pub struct Limits<const R: usize> {
     joints: heapless::Vec<JointLimits, MAX_JOINTS>,
@@ -82,6 +83,7 @@ impl<const R: usize> Limits<R> {
         axes: &[AxisLimits],
         singularity_guard: f64,
     ) -> Result<Self, LimitsError> {
+        const { assert!(R.is_multiple_of(2), "rows are worked on in pairs") };
         let rows = joints.len() + axes.len();
         let too_many = LimitsError::TooMany { rows, room: R };
         if rows > R {
@@ -165,7 +167,16 @@ impl<const R: usize> Limits<R> {
     /// # Errors
     /// The first joint, or else axis, outside its travel.
     pub fn check_travel(&self, pose: &Pose, joints: &Joints) -> Result<(), PlanErrorKind> {
-        for (row, value) in self.row_values(pose, joints).into_iter().enumerate().take(self.rows()) {
+        self.check_rows(&self.row_values(pose, joints))
+    }
+
+    /// The same, row by row.
+    pub(crate) fn check_rows(&self, values: &[f64; R]) -> Result<(), PlanErrorKind> {
+        let ends = self.lowest.iter().zip(&self.highest);
+        if values.iter().zip(ends).all(|(value, (low, high))| value >= low && value <= high) {
+            return Ok(());
+        }
+        for (row, &value) in values.iter().enumerate().take(self.rows()) {
             if let Some(range) = self.range(row).filter(|range| !range.contains(value)) {
                 return Err(self.out_of_travel(row, value, range));
             }
@@ -187,10 +198,11 @@ impl<const R: usize> Limits<R> {
     ) -> Result<(), PlanError> {
         let point = piece.geometry.at(s);
         let pose = Pose::from_array(point.position);
+        let (first, second) = (Pose::from_array(point.first), Pose::from_array(point.second));
         let fail = |kind| PlanError { kind, span: piece.span, pose };
-        let motion = kinematics
-            .motion(&pose, &Pose::from_array(point.first), &Pose::from_array(point.second))
-            .map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
+        // By reference: to move it out costs a tenth of this function.
+        let motion = &kinematics.motion(&pose, &first, &second);
+        let motion = motion.as_ref().map_err(|&error| fail(PlanErrorKind::Unreachable(error)))?;
         if self.singularity_guard > 0.0 {
             self.check_travel(&pose, &motion.position).map_err(fail)?;
             let measure = kinematics.singularity(&pose).map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
@@ -200,30 +212,29 @@ impl<const R: usize> Limits<R> {
             }
         }
         sample.feed = piece.feed.cap(&point.first);
+        let (mut fastest, mut within) = (0.0, true);
         let joints = motion.position.iter().zip(&motion.velocity).zip(&motion.acceleration);
+        let axes = self
+            .axes
+            .iter()
+            .map(|limits| (pose.get(limits.axis), first.get(limits.axis), second.get(limits.axis)));
         let joints = joints.take(self.joints.len()).map(|((q, d1), d2)| (*q, *d1, *d2));
-        let axes = self.axes.iter().map(|limits| {
-            let k = limits.axis as usize;
-            let at = |v: &[f64; 9]| v.get(k).copied().unwrap_or(0.0);
-            (at(&point.position), at(&point.first), at(&point.second))
-        });
-        let (mut fastest, mut within) = (0.0_f64, true);
-        let mut set = |row: usize, (q, d1, d2): (f64, f64, f64)| {
-            if row < R {
-                let speed = d1 * self.per_velocity[row];
-                sample.rows.first[row] = d1 * self.per_acceleration[row];
-                sample.rows.second[row] = d2 * self.per_acceleration[row];
-                sample.speed[row] = speed;
-                sample.position[row] = q;
-                fastest = fastest.max(speed.abs());
-                within &= q >= self.lowest[row] && q <= self.highest[row];
-            }
-        };
-        for (row, values) in joints.enumerate() {
-            set(row, values);
-        }
-        for (row, values) in axes.enumerate() {
-            set(self.joints.len() + row, values);
+        let scales = self.per_velocity.iter().zip(&self.per_acceleration);
+        let strips = sample.rows.first.iter_mut().zip(&mut sample.rows.second);
+        let places = sample.speed.iter_mut().zip(&mut sample.position);
+        let ends = self.lowest.iter().zip(&self.highest);
+        let rows = strips.zip(places).zip(scales).zip(ends);
+        for (
+            ((((strip, bend), (speed, place)), (per_velocity, per_acceleration)), (low, high)),
+            (q, d1, d2),
+        ) in rows.zip(joints.chain(axes))
+        {
+            *strip = d1 * per_acceleration;
+            *bend = d2 * per_acceleration;
+            *speed = d1 * per_velocity;
+            *place = q;
+            fastest = higher(fastest, speed.abs());
+            within &= q >= *low && q <= *high;
         }
         sample.hard = speed_cap(fastest);
         if within { Ok(()) } else { self.check_travel(&pose, &motion.position).map_err(fail) }
@@ -244,7 +255,17 @@ impl<const R: usize> Limits<R> {
         piece: &Piece,
         s: f64,
     ) -> Result<f64, PlanError> {
-        let mut cap = a.hard.min(b.hard);
+        let mut cap = lower(a.hard, b.hard);
+        // As a rule neither q′ nor q″ of any row changes its sign.
+        let opposite = |a: &[f64; R], b: &[f64; R]| {
+            let products = a.as_chunks().0.iter().zip(b.as_chunks().0).take(self.rows().div_ceil(2));
+            lowest(products.fold([0.0; 2], |least, (&a, &b)| with(least, with(a, b, |a, b| a * b), lower)))
+                < 0.0
+        };
+        let (bends, turns) = (opposite(&a.rows.second, &b.rows.second), opposite(&a.speed, &b.speed));
+        if !(bends || turns) {
+            return Ok(cap);
+        }
         for row in 0..self.rows().min(R) {
             let (speed_a, speed_b) = (a.speed[row], b.speed[row]);
             let (bend_a, bend_b) = (a.rows.second[row], b.rows.second[row]);
@@ -303,11 +324,20 @@ impl Feed {
     }
 }
 
-/// Strips |first·s̈ + second·x| ≤ 1.
+/// Strips |first·s̈ + second·x| ≤ 1; past the rows in use both are 0.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rows<const R: usize> {
     pub(crate) first: [f64; R],
     pub(crate) second: [f64; R],
+}
+
+impl<const R: usize> Rows<R> {
+    /// first and second of the rows in use, two rows at a time.
+    #[inline(always)]
+    pub(crate) fn pairs(&self, rows: usize) -> impl Iterator<Item = (Pair, Pair)> {
+        let (first, second) = (self.first.as_chunks().0, self.second.as_chunks().0);
+        first.iter().copied().zip(second.iter().copied()).take(rows.div_ceil(2))
+    }
 }
 
 /// Everything known at one point of the path.
@@ -335,24 +365,23 @@ impl<const R: usize> Sample<R> {
     /// How much the strips change between two points, in shares of the limits: the measure that spaces the nodes.
     /// Also returns x̂, the scale of speed there.
     pub(crate) fn variation(&self, other: &Self, rows: usize) -> Scales {
-        let mut steepest = 0.0_f64;
-        let mut bend = 0.0_f64;
-        for (a, b) in self.rows.first.iter().zip(&other.rows.first).take(rows) {
-            steepest = steepest.max(a.abs()).max(b.abs());
+        let (mut steepest, mut bend) = ([0.0; 2], [0.0; 2]);
+        for ((a1, a2), (b1, b2)) in self.rows.pairs(rows).zip(other.rows.pairs(rows)) {
+            let largest = |a: f64, b: f64| higher(a.abs(), b.abs());
+            steepest = with(steepest, with(a1, b1, largest), higher);
+            bend = with(bend, with(a2, b2, largest), higher);
         }
-        for (a, b) in self.rows.second.iter().zip(&other.rows.second).take(rows) {
-            bend = bend.max(a.abs()).max(b.abs());
-        }
+        let (steepest, bend) = (highest(steepest), highest(bend));
         let by_bend = if bend * FASTEST > 2.0 { 2.0 / bend } else { FASTEST };
-        let speed = self.hard.min(other.hard).min(self.feed).min(other.feed).min(by_bend);
+        let speed = [other.hard, self.feed, other.feed, by_bend].into_iter().fold(self.hard, lower);
         let acceleration = if steepest > 0.0 { 1.0 / steepest } else { FASTEST };
-        let mut change = 0.0_f64;
-        let firsts = self.rows.first.iter().zip(&other.rows.first);
-        let seconds = self.rows.second.iter().zip(&other.rows.second);
-        for ((a1, b1), (a2, b2)) in firsts.zip(seconds).take(rows) {
-            change = change.max((b1 - a1).abs() * acceleration + (b2 - a2).abs() * speed);
+        let mut change = [0.0; 2];
+        for ((a1, a2), (b1, b2)) in self.rows.pairs(rows).zip(other.rows.pairs(rows)) {
+            let steeper = with(a1, b1, |a, b| (b - a).abs() * acceleration);
+            let bent = with(a2, b2, |a, b| (b - a).abs() * speed);
+            change = with(change, with(steeper, bent, |steeper, bent| steeper + bent), higher);
         }
-        Scales { change, speed }
+        Scales { change: highest(change), speed }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::{PlanError, PlanErrorKind, path, walk};
 use core::ops::ControlFlow;
 use heapless::Deque;
 use pkm_canon::Span;
-use pkm_kins::{Joints, Kinematics, Pose};
+use pkm_kins::{JointRange, Joints, Kinematics, Pose};
 
 /// How a move ends where the next one begins (G61, G61.1, G64).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -152,7 +152,7 @@ impl<K, const R: usize, const PIECES: usize, const NODES: usize> core::fmt::Debu
     }
 }
 
-/// Plans moves on a machine with at most `R` limited joints and axes; `PIECES` and `NODES` bound the look-ahead.
+/// Plans moves on a machine with at most `R` limited joints and axes (an even number: they are worked on in pairs); `PIECES` and `NODES` bound the look-ahead.
 pub struct Planner<K, const R: usize, const PIECES: usize, const NODES: usize> {
     pub(crate) kinematics: K,
     pub(crate) limits: Limits<R>,
@@ -173,6 +173,8 @@ pub struct Planner<K, const R: usize, const PIECES: usize, const NODES: usize> {
     pub(crate) starved: bool,
     moves: u32,
     end: Vector,
+    /// Joints and limited axes there, once a move that ends there has been looked at.
+    end_rows: Option<[f64; R]>,
 }
 
 impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Planner<K, R, PIECES, NODES> {
@@ -211,6 +213,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             starved: false,
             moves: 0,
             end: start.to_array(),
+            end_rows: None,
         })
     }
 
@@ -268,10 +271,16 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             return Err(PushError::Plan(PlanError { kind: PlanErrorKind::NoFeed, span: next.span, pose }));
         }
         let mut found = None;
-        self.limits.walk(
+        // On a line, what is right where the last move ended is right where this one begins.
+        let start = match &next.geometry {
+            Geometry::Line(line) => self.end_rows.filter(|_| is_near(&line.start, &self.end)),
+            _ => None,
+        };
+        self.end_rows = self.limits.walk(
             &self.kinematics,
             &next.geometry,
             (walk::places(&next.geometry), false),
+            start,
             |pose, outcome| {
                 found = outcome.err().map(|kind| PlanError { kind, span: next.span, pose: *pose });
                 if found.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -432,10 +441,16 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         (self.fault, self.refused) = (None, None);
         self.starved = false;
         self.end = self.setpoint.pose.to_array();
+        self.end_rows = None;
     }
 
     pub(crate) fn pose_at(&self, piece: u64, s: f64) -> Option<(path::Point, &Piece)> {
         let piece = self.piece(piece)?;
         Some((piece.geometry.at(s), piece))
     }
+}
+
+/// The same place but for rounding.
+fn is_near(a: &Vector, b: &Vector) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= JointRange::TOLERANCE)
 }

@@ -35,9 +35,9 @@ mod tests {
     use super::*;
     use crate::path::{FeedGroup, Geometry, Line};
     use crate::{Feed, JointLimits, Limits, Move, PathMode, Settings};
-    use pkm_kins::{HvMachine, HvMachineParameters, JointRange, Spindle};
+    use pkm_kins::{Axis, HvMachine, HvMachineParameters, InverseError, JointRange, Spindle};
 
-    type Small = Planner<HvMachine, 7, 16, 64>;
+    type Small = Planner<HvMachine, 8, 16, 64>;
 
     fn planner() -> Small {
         let linear = JointLimits {
@@ -61,6 +61,16 @@ mod tests {
         let geometry = Geometry::Line(Line::new(*planner.end(), to.to_array()).unwrap());
         let feed = Feed { speed: 50.0, group: FeedGroup::Mixed };
         Move { geometry, feed, rapid: false, mode: PathMode::ExactStop, span: Span::default() }
+    }
+
+    /// Every place of such a line can be reached; that the axis moves is what is refused, before anything is cut.
+    #[test]
+    fn a_line_along_the_axis_of_the_idle_mechanism_is_refused_by_the_push() {
+        let mut planner = planner();
+        let refused = planner.push(line(&planner, Pose { x: 10.0, u: 3.0, ..Pose::ZERO }));
+        let Err(PushError::Plan(error)) = refused else { panic!("{refused:?}") };
+        let locked = PlanErrorKind::Unreachable(InverseError::AxisLocked { axis: Axis::U });
+        assert_eq!((error.kind, planner.work().nodes), (locked, 0));
     }
 
     #[test]

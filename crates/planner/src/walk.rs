@@ -26,6 +26,9 @@ impl<const R: usize> Limits<R> {
     /// Looks at `places` + 1 places evenly along `geometry`, and at where a joint or an axis turns back between them.
     /// `each` gets the pose and the distance from singularities (infinite unless `measure`d or guarded), or what is wrong there; it may end the walk.
     ///
+    /// `start`: where the joints and axes are at the start, if it has been looked at already; it is not looked at again then.
+    /// Returns where they are at the end, unless something is wrong there or the walk was ended.
+    ///
     /// Between the places a joint is taken for a parabola through three of them: travel is judged with an error of the
     /// third order in their distance.
     pub fn walk<K: Kinematics>(
@@ -33,32 +36,35 @@ impl<const R: usize> Limits<R> {
         kinematics: &K,
         geometry: &Geometry,
         (places, measure): (u32, bool),
+        start: Option<[f64; R]>,
         mut each: impl FnMut(&Pose, Result<Singularity, PlanErrorKind>) -> ControlFlow<()>,
-    ) {
+    ) -> Option<[f64; R]> {
         let (length, places) = (geometry.length(), places.max(1));
         // Rows at the two places before, where they are known.
-        let mut known = 0;
-        let mut last = [[0.0; R]; 2];
+        let mut known = usize::from(start.is_some());
+        let mut last = [start.unwrap_or([0.0; R]); 2];
         let mut middle = Pose::ZERO;
-        for k in 0..=places {
+        for k in u32::from(start.is_some())..=places {
             let s = if k == places { length } else { length * f64::from(k) / f64::from(places) };
             let point = geometry.at(s);
-            let [pose, first, second] = [point.position, point.first, point.second].map(Pose::from_array);
+            let pose = Pose::from_array(point.position);
+            let (first, second) = (Pose::from_array(point.first), Pose::from_array(point.second));
             // Not the place alone: an axis may be locked, a form switch too near to be passed.
-            let looked = kinematics.motion(&pose, &first, &second).map_err(PlanErrorKind::Unreachable);
-            let found = looked.and_then(|motion| {
-                self.check_travel(&pose, &motion.position)?;
+            let looked = kinematics.passage(&pose, &first, &second).map_err(PlanErrorKind::Unreachable);
+            let found = looked.and_then(|joints| {
+                let rows = self.row_values(&pose, &joints);
+                self.check_rows(&rows)?;
                 if !measure && !(self.singularity_guard > 0.0) {
                     let far =
                         Singularity { inverse: f64::INFINITY, inverse_joint: 0, forward: f64::INFINITY };
-                    return Ok((self.row_values(&pose, &motion.position), far));
+                    return Ok((rows, far));
                 }
                 let near = kinematics.singularity(&pose).map_err(PlanErrorKind::Unreachable)?;
                 let measure = near.inverse.min(near.forward);
                 if self.singularity_guard > 0.0 && !(measure >= self.singularity_guard) {
                     return Err(PlanErrorKind::Unreachable(InverseError::Singular { measure }));
                 }
-                Ok((self.row_values(&pose, &motion.position), near))
+                Ok((rows, near))
             });
             let outcome = match found {
                 Ok((now, near)) => {
@@ -66,7 +72,7 @@ impl<const R: usize> Limits<R> {
                         && let Some(kind) = self.turns_outside(&last, &now)
                         && each(&middle, Err(kind)).is_break()
                     {
-                        return;
+                        return None;
                     }
                     known = (known + 1).min(2);
                     last = [last[1], now];
@@ -79,9 +85,10 @@ impl<const R: usize> Limits<R> {
             };
             middle = pose;
             if each(&pose, outcome).is_break() {
-                return;
+                return None;
             }
         }
+        (known > 0).then_some(last[1])
     }
 
     /// A joint or axis that turns back outside its travel around the second of three evenly spaced places.

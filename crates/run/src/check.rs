@@ -374,7 +374,7 @@ fn check_move(
     let count = (length * bend / SPACING).clamp(2.0, f64::from(MOST_SAMPLES)) as u32;
     let mut nearest: Option<(f64, usize, Pose)> = None;
     let mut worst: Option<(PlanErrorKind, Pose)> = None;
-    limits.walk(mechanism, &step.geometry, (count, true), |pose, outcome| {
+    limits.walk(mechanism, &step.geometry, (count, true), None, |pose, outcome| {
         match outcome {
             Err(kind) => {
                 if worst.as_ref().is_none_or(|(known, _)| excess(&kind, known) > 0.0) {

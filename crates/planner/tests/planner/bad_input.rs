@@ -4,7 +4,7 @@
 use crate::catalogue::{Case, blend, identity, moma, polyline, xyz};
 use crate::harness::{Disturbance, Rig, Sampling, TestPlanner, drive, limits, start, to_move, with_stack};
 use pkm_canon::Span;
-use pkm_kins::{Axis, JointRange, Kinematics};
+use pkm_kins::{Axis, InverseError, JointRange, Kinematics, OxForm, OxGlide, Pose};
 use pkm_planner::path::{Arc, Geometry, Line, Vector};
 use pkm_planner::{
     AxisLimits, JointLimits, Limits, LimitsError, PathMode, PlanErrorKind, PushError, Settings, State,
@@ -232,7 +232,7 @@ fn rotary_and_mixed_moves_hold_every_limit() {
 #[test]
 fn a_start_out_of_reach_or_travel_is_refused() {
     let case = on_moma(&[xyz(0.0, -265.0, 0.0), xyz(1.0, -265.0, 0.0)], PathMode::ExactStop, 1.0);
-    let far = pkm_kins::Pose::from_array(xyz(900.0, -265.0, 0.0));
+    let far = Pose::from_array(xyz(900.0, -265.0, 0.0));
     with_stack(move || {
         let refused = TestPlanner::new(case.mechanism, limits(&case), SETTINGS, far);
         assert!(matches!(refused.map(|_| ()).unwrap_err().kind, PlanErrorKind::Unreachable(_)));
@@ -248,8 +248,7 @@ fn a_move_that_leaves_the_travel_between_its_ends_is_refused_by_the_push() {
         let arc = Arc::new(points[1], points[2], [0.0, -265.0, 0.0], [0.0, 0.0, 1.0], -1).unwrap();
         let mut case = on_moma(&points, blend(0.1), 50.0);
         case.moves[1] = (Geometry::Arc(arc), blend(0.1));
-        let joint_1 =
-            |place: &Vector| case.mechanism.inverse(&pkm_kins::Pose::from_array(*place)).unwrap()[0];
+        let joint_1 = |place: &Vector| case.mechanism.inverse(&Pose::from_array(*place)).unwrap()[0];
         let ends = points.iter().map(joint_1).fold(f64::MIN, f64::max);
         let along = |k: u32| Geometry::Arc(arc).at(arc.length * f64::from(k) / 10_000.0).position;
         let top = (0..=10_000).map(|k| joint_1(&along(k))).fold(f64::MIN, f64::max);
@@ -284,6 +283,102 @@ fn a_move_that_leaves_the_travel_between_its_ends_is_refused_by_the_push() {
         let arrives = (0..10_000).any(|_| planner.tick().unwrap().state == State::Idle);
         assert!(arrives, "stops short of the refused move: {:?}", planner.setpoint());
         assert_eq!(planner.setpoint().pose.to_array(), points[1]);
+    });
+}
+
+/// A line is not looked at again where the one before has ended; what it does from there on is.
+#[test]
+fn a_joint_that_turns_back_outside_its_travel_just_after_the_start_of_a_line_is_refused_by_the_push() {
+    with_stack(|| {
+        // Along this line joint 1 is lowest at `turn_mm`, where its link is at a right angle to the line.
+        let at = |s: f64| {
+            let k = 1.0 / libm::hypot(165.0, 105.0);
+            xyz(165.0 * k * s, -265.0 + 105.0 * k * s, 0.0)
+        };
+        let joint_1 = |s: f64| moma().inverse(&Pose::from_array(at(s))).unwrap()[0];
+        let (mut low, mut high) = (-30.0, 30.0);
+        for _ in 0..100 {
+            let third = (high - low) / 3.0;
+            if joint_1(low + third) > joint_1(high - third) { low += third } else { high -= third }
+        }
+        let turn_mm = low;
+        // The second line begins 0.6 mm before that; a place every millimetre finds the joint within its travel.
+        let points = [-40.0, -0.6, 20.4].map(|s| at(turn_mm + s));
+        let lowest = joint_1(turn_mm);
+        let range = JointRange { min: lowest + 1e-4, max: 1000.0 };
+        for s in [-0.6, 0.4, 1.4] {
+            assert!(range.contains(joint_1(turn_mm + s)), "{} {lowest}", joint_1(turn_mm + s));
+        }
+        let case = on_moma(&points, blend(0.01), 50.0);
+        let joint = JointLimits { range, max_velocity: 100.0, max_acceleration: 1000.0 };
+        let wide = JointRange { min: -1000.0, max: 1000.0 };
+        let limits = Limits::new(&[joint, JointLimits { range: wide, ..joint }], &[], 0.0).unwrap();
+        let mut planner = Box::new(TestPlanner::new(case.mechanism, limits, SETTINGS, start(&case)).unwrap());
+        planner.push(to_move(&case, case.moves[0])).unwrap();
+        let before = planner.work();
+        let refused = planner.push(to_move(&case, case.moves[1]));
+        let Err(PushError::Plan(error)) = refused else { panic!("{refused:?}") };
+        let PlanErrorKind::JointTravel { joint: 0, value, .. } = error.kind else { panic!("{error:?}") };
+        assert!((value - lowest).abs() < 1e-5, "{error:?}: it turns at {lowest}");
+        assert_eq!(planner.work(), before, "found before anything was cut into nodes");
+    });
+}
+
+/// Far ahead of the machine and of the nodes, at the first place looked at that is outside.
+#[test]
+fn a_long_line_that_ends_out_of_travel_or_reach_is_refused_by_the_push() {
+    with_stack(|| {
+        let points = [xyz(-50.0, -270.0, 0.0), xyz(49.5, -270.0, 0.0)];
+        let joint_1 = |x: f64| moma().inverse(&Pose::from_array(xyz(x, -270.0, 0.0))).unwrap()[0];
+        let all = JointRange { min: -1000.0, max: 1000.0 };
+        let tight = if joint_1(49.5) > joint_1(40.0) {
+            JointRange { max: joint_1(40.0), ..all }
+        } else {
+            JointRange { min: joint_1(40.0), ..all }
+        };
+        for (range, far, expected_mm) in [(tight, 49.5, 40.0), (all, 149.5, f64::NAN)] {
+            let case = on_moma(&[points[0], xyz(far, -270.0, 0.0)], blend(0.01), 50.0);
+            let joint = JointLimits { range, max_velocity: 100.0, max_acceleration: 1000.0 };
+            let limits = Limits::new(&[joint, JointLimits { range: all, ..joint }], &[], 0.0).unwrap();
+            let mut planner =
+                Box::new(TestPlanner::new(case.mechanism, limits, SETTINGS, start(&case)).unwrap());
+            let refused = planner.push(to_move(&case, case.moves[0]));
+            let Err(PushError::Plan(error)) = refused else { panic!("{refused:?}") };
+            match error.kind {
+                // 100 places, but no more than 64 are looked at: one every 1.55 mm.
+                PlanErrorKind::JointTravel { joint: 0, .. } => {
+                    let past = error.pose.x - expected_mm;
+                    assert!((0.0..1.6).contains(&past), "{error:?}");
+                }
+                PlanErrorKind::Unreachable(_) => assert!(expected_mm.is_nan(), "{error:?}"),
+                other => panic!("{other:?}"),
+            }
+            assert_eq!(planner.work().nodes, 0, "found before anything was cut into nodes");
+        }
+    });
+}
+
+/// Its places can be reached, but no path may lead there: what a motion is refused, the push refuses.
+#[test]
+fn a_line_too_near_to_the_form_switch_is_refused_by_the_push() {
+    with_stack(|| {
+        let glide = OxGlide::new(&OxForm::O.into()).unwrap();
+        // With links of 80 mm, c is 1.26 mm at the end, less than the 2 mm that are asked for.
+        let points = [xyz(0.0, 50.0, 0.0), xyz(0.0, 79.99, 0.0)];
+        assert!(glide.inverse(&Pose::from_array(points[1])).is_ok());
+        let case = Case {
+            mechanism: glide.into(),
+            velocity: vec![100.0; 3],
+            acceleration: vec![1000.0; 3],
+            moves: polyline(&points, PathMode::ExactStop),
+            feed_mm_s: 50.0,
+        };
+        let mut planner =
+            Box::new(TestPlanner::new(case.mechanism, limits(&case), SETTINGS, start(&case)).unwrap());
+        let refused = planner.push(to_move(&case, case.moves[0]));
+        let Err(PushError::Plan(error)) = refused else { panic!("{refused:?}") };
+        let near = matches!(error.kind, PlanErrorKind::Unreachable(InverseError::FormSwitch { .. }));
+        assert!(near && planner.work().nodes == 0, "{error:?} {:?}", planner.work());
     });
 }
 
