@@ -32,29 +32,40 @@ fn refuse<T>(code: &'static str, message: String, help: &str) -> Result<T, Impor
     Err(ImportError { code, message, help: help.to_owned() })
 }
 
-/// Reads an INI file's text; `read` gives the text of a HAL file it names.
+/// Reads an INI file's text; `read` gives the text of a file it names.
 ///
 /// # Errors
 /// No INI of LinuxCNC, kinematics that `pkm` does not have, a geometry that is not complete.
 pub fn import(ini: &str, read: &dyn Fn(&str) -> Option<String>) -> Result<Imported, ImportError> {
-    let ini = Ini::parse(ini);
+    let (ini, missing) = Ini::included(ini, read);
+    let ini = Ini::parse(&ini);
     if !ini.has("KINS") || !ini.has("JOINT_0") {
         return refuse(
             "linuxcnc-ini",
-            "no [KINS] and [JOINT_0]: not an INI file of LinuxCNC 2.8 or newer".into(),
+            match &missing[..] {
+                [] => "no [KINS] and [JOINT_0]: not an INI file of LinuxCNC 2.8 or newer".into(),
+                missing => {
+                    format!("no [KINS] and [JOINT_0], and #INCLUDE {} cannot be read", missing.join(", "))
+                }
+            },
             "LinuxCNC's update_ini converts older files",
         );
     }
-    let mut import = Import { hal: Hal::default(), remarks: Vec::new(), inch: 1.0, ini: &ini };
+    let remarks = missing.iter().map(|name| format!("#INCLUDE {name} cannot be read")).collect();
+    let mut import = Import { hal: Hal::default(), remarks, inch: 1.0, ini: &ini };
     import.read_hal(read);
-    import.inch = match ini.get("TRAJ", "LINEAR_UNITS").unwrap_or("mm").to_ascii_lowercase().as_str() {
-        "mm" | "metric" => 1.0,
-        "in" | "inch" | "imperial" => 25.4,
-        other => {
+    let units = ini.get("TRAJ", "LINEAR_UNITS").unwrap_or("mm").to_ascii_lowercase();
+    import.inch = match (units.as_str(), units.parse::<f64>()) {
+        ("mm" | "metric", _) => 1.0,
+        ("in" | "inch" | "imperial", _) => 25.4,
+        // a number counts units per mm; an inch is written with few digits
+        (_, Ok(number)) if (number * 25.4 - 1.0).abs() < 1e-3 => 25.4,
+        (_, Ok(number)) if number > 0.0 && number.is_finite() => 1.0 / number,
+        _ => {
             return refuse(
                 "linuxcnc-units",
-                format!("[TRAJ]LINEAR_UNITS = {other} is neither mm nor inch"),
-                "",
+                format!("[TRAJ]LINEAR_UNITS = {units} is neither mm nor inch"),
+                "write mm or inch",
             );
         }
     };
@@ -207,7 +218,7 @@ impl Import<'_> {
         let factor = if rotary { 1.0 } else { self.inch };
         let unit = if rotary { "deg" } else { "mm" };
         let mut given = |key: &str, otherwise: f64| match ini.number(&section, key) {
-            Some(value) if value.abs() < 1e6 => value * factor,
+            Some(value) if value.abs() < 1e6 => metric(value, factor),
             _ => {
                 self.remarks.push(format!("[{section}]{key} is missing: {otherwise} {unit} stands for it"));
                 otherwise
@@ -216,7 +227,7 @@ impl Import<'_> {
         let (min, max) = (given("MIN_LIMIT", -1000.0), given("MAX_LIMIT", 1000.0));
         let velocity = given("MAX_VELOCITY", 10.0);
         let acceleration = given("MAX_ACCELERATION", 100.0);
-        let home = ini.number(&section, "HOME").unwrap_or(0.0) * factor;
+        let home = metric(ini.number(&section, "HOME").unwrap_or(0.0), factor);
         let stepgen = self.stepgen(joint);
         let scale = ["SCALE", "STEP_SCALE", "OUTPUT_SCALE", "INPUT_SCALE"]
             .iter()
@@ -249,7 +260,9 @@ impl Import<'_> {
             .iter()
             .filter_map(|(key, pin, entry)| {
                 let time = self.setp(&format!("{stepgen}.{pin}")).or_else(|| ini.number(&section, entry))?;
-                Some((*key, time.round() as i64))
+                // LinuxCNC's 0 is "as short as can be"
+                let least = i64::from(matches!(*pin, "steplen" | "stepspace"));
+                Some((*key, (time.round() as i64).max(least)))
             })
             .collect();
         let model = ini
@@ -279,8 +292,9 @@ impl Import<'_> {
             }
             let (unit, factor) = if axis.is_rotary() { ("deg", 1.0) } else { ("mm", self.inch) };
             let mut lines = String::new();
-            let value =
-                |key| self.ini.number(&section, key).filter(|value| value.abs() < 1e6).map(|v| v * factor);
+            let value = |key| {
+                self.ini.number(&section, key).filter(|value| value.abs() < 1e6).map(|v| metric(v, factor))
+            };
             if let (Some(min), Some(max)) = (value("MIN_LIMIT"), value("MAX_LIMIT")) {
                 let _ = writeln!(lines, "min_{unit} = {min}\nmax_{unit} = {max}");
             }
@@ -364,14 +378,15 @@ impl Import<'_> {
                 Self::built(format!("[kinematics]\ntype = \"cartesian\"\naxes = \"{letters}\"\n"), mechanism)
             }
             "lineardeltakins" => {
-                let number = |key: &str| self.setp(&format!("lineardeltakins.{key}")).map(|v| v * self.inch);
-                let (Some(joint_radius_mm), Some(joint_length_mm)) = (number("R"), number("L")) else {
-                    return refuse(
-                        "linuxcnc-geometry",
-                        "lineardeltakins.R and .L are not set in the HAL files".into(),
-                        "setp them, in machine units",
-                    );
-                };
+                // What the module begins with, asked under halrun (LinuxCNC 2.9).
+                let [joint_radius_mm, joint_length_mm] = [("R", 130.25), ("L", 269.0)].map(|(key, own)| {
+                    let pin = format!("lineardeltakins.{key}");
+                    self.inch
+                        * self.setp(&pin).unwrap_or_else(|| {
+                            self.remark(format!("{pin} is not set: the module's own {own} stands for it"));
+                            own
+                        })
+                });
                 self.named(
                     "linear-delta",
                     &Parameters::LinearDelta(LinearDeltaParameters { joint_radius_mm, joint_length_mm }),
@@ -493,6 +508,11 @@ impl Import<'_> {
             ),
         }
     }
+}
+
+/// Inches in mm, without the rounding of the product: 1.2 in is 30.48 mm. Millimetres and degrees stay as they are.
+fn metric(value: f64, factor: f64) -> f64 {
+    if factor > 1.0 { (value * factor * 1e9).round() / 1e9 } else { value * factor }
 }
 
 fn parameters_of(text: &str) -> Option<Parameters> {

@@ -33,6 +33,27 @@ impl Ini {
         Self { entries }
     }
 
+    /// The text with its `#INCLUDE FILE` lines replaced by those files, one level deep as LinuxCNC's start script does it, and
+    /// the files that `read` does not give.
+    pub fn included(text: &str, read: &dyn Fn(&str) -> Option<String>) -> (String, Vec<String>) {
+        let (mut whole, mut missing) = (String::new(), Vec::new());
+        for line in text.lines() {
+            match line
+                .trim_start()
+                .strip_prefix("#INCLUDE")
+                .filter(|rest| rest.starts_with(char::is_whitespace))
+            {
+                None => whole.push_str(line),
+                Some(name) => match read(name.trim()) {
+                    Some(file) => whole.push_str(&file),
+                    None => missing.push(name.trim().to_owned()),
+                },
+            }
+            whole.push('\n');
+        }
+        (whole, missing)
+    }
+
     /// All values of a key, in order.
     pub fn all<'a>(&'a self, section: &'a str, key: &'a str) -> impl Iterator<Item = &'a str> {
         self.entries
@@ -107,5 +128,18 @@ mod tests {
         assert_eq!(ini.expand("p.[B]X.q[A](x)"), "p.4.q2");
         assert_eq!(ini.expand("[B]Y[C"), "[B]Y[C");
         assert!(ini.has("B") && !ini.has("C"));
+    }
+
+    #[test]
+    fn includes_are_one_level_deep() {
+        let read = |name: &str| match name {
+            "b.inc" => Some("[B]\nX = 1\n#INCLUDE c.inc\n".to_owned()),
+            _ => None,
+        };
+        let text = "#INCLUDE b.inc\nY = 2\n#INCLUDED\n  #INCLUDE  d.inc \n";
+        let (whole, missing) = Ini::included(text, &read);
+        let ini = Ini::parse(&whole);
+        assert_eq!((ini.number("B", "X"), ini.number("B", "Y")), (Some(1.0), Some(2.0)));
+        assert_eq!(missing, ["d.inc"]);
     }
 }

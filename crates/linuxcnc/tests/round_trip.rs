@@ -142,6 +142,18 @@ fn reads_a_foreign_configuration_in_inches() {
 }
 
 #[test]
+fn units_may_be_a_number_and_geometry_the_modules_own() {
+    let none = |_: &str| None;
+    let inches = import(FOREIGN, &none).unwrap();
+    assert_eq!(import(&FOREIGN.replace("= inch", "= 0.03937"), &none), Ok(inches));
+    let delta =
+        import(&FOREIGN.replace("trivkins", "lineardeltakins").replace("inch", "1.0"), &none).unwrap();
+    assert!(delta.toml.contains("joint_length_mm = 269.0\njoint_radius_mm = 130.25\n"), "{}", delta.toml);
+    assert!(delta.remarks.iter().any(|remark| remark.contains("lineardeltakins.R is not set")));
+    assert!(Machine::parse("delta", &delta.toml, &[]).is_ok());
+}
+
+#[test]
 fn refuses_what_it_cannot_read() {
     let none = |_: &str| None;
     let code = |ini: &str| import(ini, &none).unwrap_err().code;
@@ -156,8 +168,8 @@ fn refuses_what_it_cannot_read() {
     assert_eq!(code(&FOREIGN.replace("[JOINT_2]", "[JOINT_5]")), "linuxcnc-joint");
     let mm = FOREIGN.replace("inch", "mm");
     assert_eq!(code(&mm.replace("trivkins", "moma_kins")), "linuxcnc-geometry");
+    assert_eq!(code(&FOREIGN.replace("inch", "-1")), "linuxcnc-units");
     assert_eq!(code(&mm.replace("trivkins", "moma_kins machine=none")), "linuxcnc-geometry");
     assert_eq!(code(&FOREIGN.replace("trivkins", "moma_kins")), "linuxcnc-units");
-    assert_eq!(code(&mm.replace("trivkins", "lineardeltakins")), "linuxcnc-geometry");
     assert_eq!(code(&mm.replace("trivkins", "genhexkins")), "linuxcnc-geometry");
 }

@@ -15,8 +15,8 @@ use std::collections::VecDeque;
 /// Pieces and nodes for a look-ahead of thousands of short blocks.
 pub(crate) type HostPlanner = Planner<Mechanism, ROWS, 2048, 2048>;
 
-/// Joints and limited axes of any machine here.
-const ROWS: usize = 12;
+/// Joints and limited axes of any machine: nine of each.
+const ROWS: usize = 18;
 pub(crate) type HostLimits = Limits<ROWS>;
 
 /// Tolerance of a blend in rotary coordinates, rad (0.01°): G64 P speaks of lengths.

@@ -131,3 +131,35 @@ fn both_mechanisms_of_the_hv_mill() {
 fn both_forms_of_the_ox_glide() {
     holds("ox-glide-forms.ngc", "ox-glide-o", 0.02);
 }
+
+#[test]
+fn nine_axes_and_nine_joints_all_limited() {
+    use std::fmt::Write as _;
+    let mut text = String::from(
+        "name = \"nine\"\nsource = \"a test\"\n[servo]\nperiod_ns = 1000000\n[kinematics]\ntype = \"cartesian\"\n\
+         axes = \"XYZABCUVW\"\n",
+    );
+    for (letter, unit) in "xyzabcuvw".chars().zip(["mm", "deg", "mm"].iter().flat_map(|unit| [unit; 3])) {
+        let limits = format!(
+            "min_{unit} = -50\nmax_{unit} = 50\nmax_velocity_{unit}_s = 20\nmax_acceleration_{unit}_s2 = 200\n"
+        );
+        let _ = write!(
+            text,
+            "[[joint]]\nname = \"{letter}\"\n{limits}steps_per_{unit} = 400\ndriver = {{ model = \"DRV8825\" }}\n\
+             [axis.{letter}]\n{limits}"
+        );
+    }
+    text.push_str("[home]\n");
+    let machine = Machine::parse("nine", &text, &[]).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
+    let program = Program::Memory {
+        name: "nine".to_owned(),
+        text: b"G21 G90 G64 P0.01 F600\nG1 X10 Y5 Z2 A10 B20 C-5 U12 V5 W3\nG1 X0 Y0 U0 V0 C20\nM2\n"
+            .to_vec(),
+    };
+    let (summary, _) = run(&program, &machine, &Options::default(), |_| (), |_| ControlFlow::Continue(()))
+        .expect("readable");
+    assert!(summary.completed, "{:?}", summary.diagnostics);
+    assert!(
+        summary.joints.iter().all(|joint| joint.steps > 0 && joint.peak_velocity <= joint.velocity_limit)
+    );
+}
