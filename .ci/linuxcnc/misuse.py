@@ -1,39 +1,14 @@
 #!/usr/bin/python3
 """misuse.py MODULE PREFIX LENGTH: what a person may do wrong while LinuxCNC runs. Each time there must be an error and a message,
 and LinuxCNC must go on. LENGTH is a parameter of the geometry, e.g. moma.1.link-length."""
-import subprocess
-
 from session import *
 
 module, prefix, length = arguments
 count = lambda: int(hal.get_value(prefix + ".errors"))
 
 
-def halcmd(*words):
-    done = subprocess.run(["halcmd", *words], capture_output=True, text=True, timeout=20)
-    return done.returncode, (done.stdout + done.stderr).strip()
-
-
-def expect(what, condition):
-    if not condition:
-        fail(what)
-    say("ok: " + what)
-
-
 def since(start):
     return messages[start:]
-
-
-def on_again():
-    """After an error LinuxCNC may have switched the machine off: on again, and back to rest."""
-    command.abort()
-    command.wait_complete()
-    if status.task_state != linuxcnc.STATE_ON:
-        command.state(linuxcnc.STATE_ESTOP_RESET)
-        until(lambda: status.task_state >= linuxcnc.STATE_ESTOP_RESET, "emergency stop reset")
-        command.state(linuxcnc.STATE_ON)
-        until(lambda: status.task_state == linuxcnc.STATE_ON, "machine on")
-    poll()
 
 
 def move(axis, by):

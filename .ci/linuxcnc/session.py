@@ -1,5 +1,6 @@
 """What every session script needs: the machine switched on and homed, messages, waiting, and a record of every servo period."""
 import os
+import subprocess
 import sys
 import time
 
@@ -66,6 +67,30 @@ def home():
     mode(linuxcnc.MODE_MANUAL, "manual mode")
     command.home(-1)
     until(lambda: all(status.homed[: status.joints]), "homing")
+
+
+def expect(what, condition):
+    if not condition:
+        fail(what)
+    say("ok: " + what)
+
+
+def halcmd(*words):
+    """Exit status and output."""
+    done = subprocess.run(["halcmd", *words], capture_output=True, text=True, timeout=20)
+    return done.returncode, (done.stdout + done.stderr).strip()
+
+
+def on_again():
+    """After an error LinuxCNC may have switched the machine off: on again, and back to rest."""
+    command.abort()
+    command.wait_complete()
+    if status.task_state != linuxcnc.STATE_ON:
+        command.state(linuxcnc.STATE_ESTOP_RESET)
+        until(lambda: status.task_state >= linuxcnc.STATE_ESTOP_RESET, "emergency stop reset")
+        command.state(linuxcnc.STATE_ON)
+        until(lambda: status.task_state == linuxcnc.STATE_ON, "machine on")
+    poll()
 
 
 class Record:

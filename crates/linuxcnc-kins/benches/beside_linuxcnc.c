@@ -17,6 +17,7 @@ static int pin(void **data) { *data = calloc(1, 8); return 0; }
 int hal_pin_float_newf(int d, void **p, int i, const char *f, ...) { (void)d, (void)i, (void)f; return pin(p); }
 int hal_pin_bit_newf(int d, void **p, int i, const char *f, ...) { (void)d, (void)i, (void)f; return pin(p); }
 int hal_pin_u32_newf(int d, void **p, int i, const char *f, ...) { (void)d, (void)i, (void)f; return pin(p); }
+int hal_pin_float_new(const char *n, int d, void **p, int i) { (void)n, (void)d, (void)i; return pin(p); }
 int hal_pin_bit_new(const char *n, int d, void **p, int i) { (void)n, (void)d, (void)i; return pin(p); }
 int hal_pin_s32_new(const char *n, int d, void **p, int i) { (void)n, (void)d, (void)i; return pin(p); }
 int hal_pin_u32_new(const char *n, int d, void **p, int i) { (void)n, (void)d, (void)i; return pin(p); }
@@ -87,8 +88,11 @@ int main(int argc, char **argv) {
   Case *planar[] = {load(theirs, "lineardeltakins", "", none, 30, 0), load(ours, "delta_kins", "default", none, 30, 0),
                     load(ours, "moma_kins", "moma-a", low, 30, 0), load(ours, "moma_4s_kins", "moma-4s-p", low, 30, 0),
                     load(ours, "planar_kins", "moma-a", low, 30, 0), load(ours, "ox_glide_kins", "ox-glide-o", glide, 10, 0),
-                    load(ours, "moma_w_kins", "moma-w", wire, 10, 0), load(ours, "hv_mill_kins", "hv-mill-v5", none, 10, 20)};
+                    load(ours, "moma_w_kins", "moma-w", wire, 10, 0), load(ours, "hv_mill_kins", "hv-mill-v3", none, 10, 0)};
   compare(planar, 8);
+  /* A tilting head and a rotary table, as LinuxCNC has them. */
+  Case *turning[] = {load(theirs, "maxkins", "", none, 10, 20), load(ours, "hv_mill_kins", "hv-mill-v5", none, 10, 20)};
+  compare(turning, 2);
   Case *spatial[] = {load(theirs, "genhexkins", "", z20, 3, 10), load(ours, "hexapod_kins", "default", flat, 3, 10), load(ours, "lambda_kins", "lambda6", lambda, 150, 10)};
   compare(spatial, 3);
   return 0;
