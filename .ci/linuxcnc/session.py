@@ -75,10 +75,14 @@ def expect(what, condition):
     say("ok: " + what)
 
 
-def halcmd(*words):
-    """Exit status and output."""
-    done = subprocess.run(["halcmd", *words], capture_output=True, text=True, timeout=20)
+def call(*words):
+    """Exit status and output of one of LinuxCNC's programs."""
+    done = subprocess.run(words, capture_output=True, text=True, timeout=20)
     return done.returncode, (done.stdout + done.stderr).strip()
+
+
+def halcmd(*words):
+    return call("halcmd", *words)
 
 
 def on_again():

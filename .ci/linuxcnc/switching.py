@@ -94,7 +94,7 @@ halcmd("unlinkp", "motion.switchkins-type")
 for nonsense in ("1", "nan"):
     before = len(messages)
     mode(linuxcnc.MODE_MDI, "MDI")
-    command.mdi("G91 G1 F600 X5")
+    command.mdi("G91 G1 F60 X5")
     time.sleep(0.2)
     halcmd("setp", "motion.switchkins-type", nonsense)
     until(lambda: len(messages) > before, "a message")

@@ -294,8 +294,8 @@ const AT_END: f64 = 0.06;
 /// LinuxCNC's forward of the joints at rest is at most so far from the axes, mm (degrees); where stepgen has the joints, so far.
 const AT_REST: f64 = 1e-6;
 const ONE_STEP: f64 = 0.02;
-/// Servo periods after which stepgen has arrived.
-const ARRIVED: usize = 50;
+/// So many servo periods without a motion are a rest, at whose end stepgen has arrived.
+const LONG: usize = 100;
 
 fn judge(machine: &Machine, session: &Session) -> Result<String, String> {
     let Session { rows, end, program } = session;
@@ -400,26 +400,20 @@ fn steps(machine: &Machine, rows: &[Row]) -> Result<String, String> {
     let Some(Row { joints: home, counts: Some(zero), .. }) = rows.first() else {
         return Err("no counts".into());
     };
-    let (mut places, mut most, mut farthest, mut rested) = (0, 0.0_f64, 0.0_f64, 0);
-    for (k, pair) in rows.windows(2).enumerate() {
-        let (before, Row { joints, counts: Some(counts), .. }) = (&pair[0], &pair[1]) else {
-            return Err(format!("row {}: no counts", k + 1));
+    let (mut places, mut most, mut farthest) = (0, 0.0_f64, 0.0_f64);
+    for rest in rows.chunk_by(|a, b| a.joints == b.joints).filter(|rest| rest.len() > LONG) {
+        let Some(Row { joints, counts: Some(counts), .. }) = rest.last() else {
+            return Err("no counts".into());
         };
-        rested = if before.joints == *joints { rested + 1 } else { 0 };
-        if rested != ARRIVED {
-            continue;
-        }
         places += 1;
         for (number, joint) in machine.joints.iter().enumerate() {
-            let per_unit = joint.to_face(1.0);
-            let scale = joint.steps_per_unit / per_unit;
+            let scale = joint.steps_per_unit / joint.to_face(1.0);
             let way = (joints[number] - home[number]) * scale;
             let off = (counts[number] - zero[number] - way).abs();
             (most, farthest) = (most.max(off), farthest.max(way.abs()));
             if !(off <= 0.5 + 1e-3) {
                 return Err(format!(
-                    "row {}: joint {number} has made {} steps, not {way:.3}",
-                    k + 1,
+                    "rest {places}: joint {number} has made {} steps, not {way:.3}",
                     counts[number]
                 ));
             }
