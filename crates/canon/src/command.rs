@@ -96,13 +96,13 @@ pub struct Probe {
     pub must_trip: bool,
 }
 
-/// One control point of a spline in the plane, program units.
+/// One control point of a spline in its plane, program units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[allow(missing_docs)]
 pub struct ControlPoint {
-    /// Along the plane's first axis (X in G17).
+    /// Along the plane's first axis (G17 X, G18 Z, G19 Y).
     pub first: f64,
-    /// Along the plane's second axis (Y in G17).
+    /// Along the plane's second axis (G17 Y, G18 X, G19 Z).
     pub second: f64,
     /// Weight, greater than 0.
     pub weight: f64,
@@ -165,10 +165,16 @@ pub enum Canon<'a> {
         /// Turns: sign = direction (positive counter-clockwise), magnitude = full turns, rounded up.
         turns: i32,
     },
-    /// `NURBS_FEED`: a spline at feed in the active plane (G5, G5.1, G5.2); the first point is the present position.
+    /// `NURBS_FEED`: a spline at feed (G5, G5.1, G5.2; G6, G6.1, G6.2), first straight from the present position to its first
+    /// point where that is another one (G6.2).
     NurbsFeed {
+        /// The plane of the points.
+        plane: Plane,
         /// Control points, the start point included.
         points: &'a [ControlPoint],
+        /// Knots of G6.2, not falling, the first and the last `order` of them equal: as many as points and order together.
+        /// Empty: the same with steps of 1 between.
+        knots: &'a [f64],
         /// Order of the spline: degree + 1.
         order: u32,
     },

@@ -171,9 +171,14 @@ fn write_command(out: &mut Buffer, command: &Canon<'_>, spelling: Spelling, plan
             out.numbers(&[normal, end.a, end.b, end.c], b", ");
             out.put(b")");
         }
-        Canon::NurbsFeed { points, .. } => {
-            out.put(if spelling == Spelling::V2_9 { b"NURBS_FEED(" } else { b"NURBS_G5_FEED(" });
-            out.padded(points.len() as u64, 1);
+        Canon::NurbsFeed { points, knots, .. } => {
+            out.put(match (spelling, knots) {
+                (Spelling::V2_9, []) => b"NURBS_FEED(",
+                (Spelling::V2_10, []) => b"NURBS_G5_FEED(",
+                _ => b"NURBS_G6_FEED(",
+            });
+            // LinuxCNC 2.10 counts the blocks of G6.2: one per knot.
+            out.padded(points.len().max(knots.len()) as u64, 1);
             out.put(b", ...)");
         }
         Canon::RigidTap { end, .. } => out.call("RIGID_TAP", &[end.x, end.y, end.z]),

@@ -305,7 +305,7 @@ impl Block {
                     return Ok(rest); // only a run can tell
                 }
                 let code = g_code(value).map_err(|kind| fault(kind, input, rest))?;
-                self.add_g(line, code, input, rest)?;
+                self.add_g(line, code, reader, input, rest)?;
                 Ok(rest)
             }
             b'm' => {
@@ -396,12 +396,14 @@ impl Block {
         &mut self,
         line: &Line,
         code: GCode,
+        reader: &Reader,
         from: Rest<'_>,
         to: Rest<'_>,
     ) -> Result<(), nom::Err<Fault>> {
-        let group = GGroup::of(code).ok_or_else(|| {
+        let group = GGroup::of(code).filter(|_| reader.newer || !matches!(code, G6..=G6_2));
+        let group = group.ok_or_else(|| {
             let kind = match code {
-                // LinuxCNC 2.10's second form of NURBS.
+                // LinuxCNC 2.10's second form of NURBS; it reserves G6.3.
                 60..=63 => ErrorKind::GUnsupported { code: Code(code) },
                 _ => ErrorKind::GUnknown { code: Code(code) },
             };
@@ -512,6 +514,8 @@ pub(crate) struct Reader {
     pub(crate) diameter: bool,
     pub(crate) spindles: u8,
     pub(crate) machine_codes: MachineCodes,
+    /// LinuxCNC 2.10's codes are known.
+    pub(crate) newer: bool,
     /// M7 and M8 may share a block (pkm).
     pub(crate) both_coolants: bool,
     /// The largest number of an axis word (promise P5).

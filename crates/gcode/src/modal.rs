@@ -14,6 +14,9 @@ pub(crate) const G5: GCode = 50;
 pub(crate) const G5_1: GCode = 51;
 pub(crate) const G5_2: GCode = 52;
 pub(crate) const G5_3: GCode = 53;
+pub(crate) const G6: GCode = 60;
+pub(crate) const G6_1: GCode = 61;
+pub(crate) const G6_2: GCode = 62;
 pub(crate) const G10: GCode = 100;
 pub(crate) const G28: GCode = 280;
 pub(crate) const G28_1: GCode = 281;
@@ -78,6 +81,8 @@ impl GGroup {
         Some(match code {
             G4 | G10 | G28 | G28_1 | G30 | G30_1 | G52 | G53 | G92 => Self::NonModal,
             G0 | G1 | G2 | G3 | G5 | G5_1 | G5_2 | G5_3 | G33 | G33_1 => Self::Motion,
+            // LinuxCNC 2.10 and pkm.
+            G6..=G6_2 => Self::Motion,
             G38_2..=G38_5 | G73 | G74 | G76 | G80 => Self::Motion,
             700 | 710..=712 | 720..=722 => Self::Motion,
             code if is_cycle(code) => Self::Motion,

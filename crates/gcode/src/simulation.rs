@@ -1,7 +1,7 @@
 //! The machine that `rs274` simulates, as far as the interpreter reads it back (canon-format section 6).
 
 use crate::error::Error;
-use crate::interpreter::{Interpreter, Status};
+use crate::interpreter::{Interpreter, PlaneAxes, Status};
 use crate::settings::Settings;
 use crate::source::LineSource;
 use crate::tool_table::ToolTable;
@@ -18,6 +18,8 @@ pub struct SimulatedMachine<S> {
     /// The interpreter asks where the tool is: after a probe, a tool change or a new tool table, not after an input
     /// (checked with rs274 2.9).
     is_asked: bool,
+    /// LinuxCNC 2.9's does not know where a spline ends.
+    forgets_splines: bool,
 }
 
 impl<S: CanonSink> SimulatedMachine<S> {
@@ -32,6 +34,7 @@ impl<S: CanonSink> SimulatedMachine<S> {
             units: LengthUnit::Mm,
             probed: None,
             is_asked: false,
+            forgets_splines: false,
         }
     }
 
@@ -83,7 +86,13 @@ impl<S: CanonSink> CanonSink for SimulatedMachine<S> {
             }
             Canon::StraightProbe { end, .. } => self.probe(end),
             // rs274 takes the point behind the last one; mostly that is 0 (checked with rs274 2.9).
-            Canon::NurbsFeed { .. } => self.position[..2].fill(0.0),
+            Canon::NurbsFeed { .. } if self.forgets_splines => self.position[..2].fill(0.0),
+            Canon::NurbsFeed { plane, points, .. } => {
+                let axes = PlaneAxes::of(*plane);
+                if let Some(last) = points.last() {
+                    (self.position[axes.first], self.position[axes.second]) = (last.first, last.second);
+                }
+            }
             Canon::SetG5xOffset { offset, .. } => {
                 let new = offset.to_array();
                 self.shift(self.g5x, new);
@@ -144,6 +153,7 @@ pub fn canon_text_of(
     mut report: impl FnMut(&Error, &Interpreter, &dyn LineSource) -> bool,
 ) {
     let mut machine = SimulatedMachine::new(sink);
+    machine.forgets_splines = !interpreter.settings().is_newer();
     loop {
         match interpreter.step(source, &mut machine) {
             Ok(Status::Running) => {}

@@ -16,7 +16,7 @@ const ELSEWHERE: [&str; 4] = ["param-memory", "o-memory", "file-open", "start-li
 const OUT_OF_REACH: &str = "more than {limit} parameter settings in one block";
 
 /// Identifier, and a program that raises it; `|` ends a line.
-const PROGRAMS: [(&str, &str); 173] = [
+const PROGRAMS: [(&str, &str); 180] = [
     ("file-empty", ""),
     ("file-no-end", "%|G0 X1"),
     ("file-no-end", "G0 X1"),
@@ -38,7 +38,7 @@ const PROGRAMS: [(&str, &str); 173] = [
     ("negative-s", "S-1|M2"),
     ("g-range", "G100|M2"),
     ("g-unknown", "G99.9|M2"),
-    ("g-unknown", "G6.2 X1 Y1|M2"),
+    ("g-unknown", "G6.3|M2"),
     ("m-unknown", "M300|M2"),
     ("lathe-cycle", "G71 Q1|M2"),
     ("lathe-cycle", "G18 F1|o1 sub|G0 X2 Z0|G1 Z-4|X6 Z-5|o1 endsub|G0 X20 Z1|G91 G71 Q1|M2"),
@@ -184,6 +184,13 @@ const PROGRAMS: [(&str, &str); 173] = [
     ("spline-words", "F1|G5 X1 Y1|M2"),
     ("spline-words", "F1|G5 X1 Z1 P1 Q1 I1 J1|M2"),
     ("spline-words", "F1|G5.2 X1 Y1 P1|X2 Y2 P-1|M2"),
+    ("spline-words", "F1|G19 G6 Y1 Z1 P1 Q1|M2"),
+    ("spline-words", "F1|G6.2 P3 X1 Y1 K0 R1|M2"),
+    ("spline-words", "F1|G6.2 P1.5 Q1 X1 Y1 K0 R1|M2"),
+    ("nurbs-knots", "F1|G6.2 P3 Q1 X1 Y1 K0 R1|X2 Y2 K1 R1|M2"),
+    ("nurbs-points", "F1|G6.2 P2 Q1 X1 Y1 K0 R1|K0|K0|M2"),
+    ("nurbs-points", "F1|G5.2 X1 Y1 P1|G18|M2"),
+    ("nurbs-points", "F1|G5.2 X1 Y1 P1|M2"),
     ("nurbs-points", "G5.3|M2"),
     ("nurbs-points", "F1|G5.2 X1 Y1 P1|G0 X1|M2"),
     ("nurbs-points", "F1|G5.2 X1 Y1 P1|M450|M2"),

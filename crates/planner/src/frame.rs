@@ -4,11 +4,14 @@
 //! as LinuxCNC's canon layer applies it). Lengths become mm, angles radians.
 
 use crate::limits::Feed;
-use crate::path::{Arc, FeedGroup, Geometry, Line, Spline, Tolerance, Vector, combine, feed_group};
+use crate::path::{Arc, FeedGroup, Geometry, Line, Spline, Tolerance, Vector, combine, feed_group, norm3};
 use crate::planner::{Move, PathMode};
 use crate::synchronised::SynchronisedMove;
-use pkm_canon::{Canon, ControlPoint, Direction, MotionControlMode, Plane, Position, Probe, Span};
+use pkm_canon::{Canon, Direction, MotionControlMode, Plane, Position, Probe, Span};
 use pkm_kins::maths::radians;
+
+/// A spline begins where the machine stands if it is not farther away than this.
+const SAME_PLACE_MM: f64 = 1e-9;
 
 /// What a canonical command asks of the machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -140,7 +143,9 @@ impl Frame {
             Canon::ArcFeed { end, first_centre, second_centre, turns } => {
                 self.arc(end, [first_centre, second_centre], turns, span, emit);
             }
-            Canon::NurbsFeed { points, order } => self.spline(points, order, span, emit),
+            Canon::NurbsFeed { plane, points, knots, order } => {
+                self.spline(plane, Spline::new(points, knots, order, self.unit_mm), span, emit);
+            }
             Canon::StraightProbe { end, probe } => self.line(end, false, span, |event| {
                 emit(if let Event::Move(step) = event { Event::Probe(step, probe) } else { event });
             }),
@@ -287,8 +292,8 @@ impl Frame {
     }
 
     /// The machine's XYZ indices of the plane's first and second axis and of its normal.
-    fn plane_axes(&self) -> [usize; 3] {
-        match self.plane {
+    fn plane_axes(plane: Plane) -> [usize; 3] {
+        match plane {
             Plane::Xy | Plane::Uv => [0, 1, 2],
             Plane::Xz | Plane::Uw => [2, 0, 1],
             Plane::Yz | Plane::Vw => [1, 2, 0],
@@ -297,7 +302,7 @@ impl Frame {
 
     fn arc(&mut self, end: Position, centre: [f64; 2], turns: i32, span: Span, mut emit: impl FnMut(Event)) {
         let program_end = self.scaled(end);
-        let [first, second, normal] = self.plane_axes();
+        let [first, second, normal] = Self::plane_axes(self.plane);
         // The centre lies in the plane of the end point; only its axis matters.
         let mut at_centre = program_end;
         at_centre[first] = centre[0] * self.unit_mm;
@@ -320,13 +325,13 @@ impl Frame {
         emit(Event::Move(Move { geometry, feed, rapid: false, mode: self.mode, span }));
     }
 
-    /// A spline leaves the coordinates outside its plane as they are.
-    fn spline(&mut self, points: &[ControlPoint], order: u32, span: Span, mut emit: impl FnMut(Event)) {
-        let Some(spline) = Spline::new(points, order, self.unit_mm) else {
-            emit(Event::Unsupported("a spline of this order (2 to 12), number of points or weights"));
+    /// A spline leaves the coordinates outside its plane as they are. Where it begins elsewhere the way there is straight.
+    fn spline(&mut self, plane: Plane, spline: Option<Spline<'_>>, span: Span, mut emit: impl FnMut(Event)) {
+        let Some(spline) = spline else {
+            emit(Event::Unsupported("a spline of this order (2 to 12), number of points, weights or knots"));
             return;
         };
-        let [first, second, _] = self.plane_axes();
+        let [first, second, _] = Self::plane_axes(plane);
         let here = self.position;
         let lift = |[a, b]: [f64; 2], direction: bool| {
             let mut p = [0.0; 3];
@@ -353,6 +358,12 @@ impl Frame {
             v
         };
         let (feed, mode) = (self.feed(FeedGroup::Xyz), self.mode);
+        let begin = lift(spline.begin(), false);
+        if norm3(&combine(&begin, &here, |b, h| b - h), 0) > SAME_PLACE_MM
+            && let Some(line) = Line::new(here, begin)
+        {
+            emit(Event::Move(Move { geometry: Geometry::Line(line), feed, rapid: false, mode, span }));
+        }
         let mut end = here;
         spline.cubics(lift, |cubic| {
             end = Geometry::Blend(cubic).at(cubic.length).position;

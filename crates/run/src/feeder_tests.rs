@@ -186,3 +186,83 @@ fn every_feed_mode_uses_the_one_feed_length() {
         }
     }
 }
+
+/// A point of a NURBS by the basis functions of Cox and de Boor; the planner climbs de Boor's triangle instead.
+fn nurbs(points: &[[f64; 3]], knots: &[f64], order: usize, t: f64) -> [f64; 2] {
+    fn basis(i: usize, k: usize, t: f64, knots: &[f64]) -> f64 {
+        if k == 1 {
+            let last = t == knots[knots.len() - 1] && knots[i] < t && knots[i + 1] == t;
+            return f64::from(knots[i] <= t && t < knots[i + 1] || last);
+        }
+        let part = |over: f64, under: f64, of: f64| if under > 0.0 { over / under * of } else { 0.0 };
+        part(t - knots[i], knots[i + k - 1] - knots[i], basis(i, k - 1, t, knots))
+            + part(knots[i + k] - t, knots[i + k] - knots[i + 1], basis(i + 1, k - 1, t, knots))
+    }
+    let mut sums = [0.0; 3];
+    for (i, [a, b, weight]) in points.iter().enumerate() {
+        let share = weight * basis(i, order, t, knots);
+        sums = [sums[0] + share * a, sums[1] + share * b, sums[2] + share];
+    }
+    [sums[0] / sums[2], sums[1] / sums[2]]
+}
+
+/// Begin, middle and end of the curve and everything between, in the plane that was selected.
+#[test]
+fn splines_are_driven_in_their_plane() {
+    const CUBIC: [[f64; 3]; 4] = [[0.0, 0.0, 1.0], [9.0, 2.0, 1.0], [17.0, 16.0, 1.0], [20.0, 10.0, 1.0]];
+    const RATIONAL: [[f64; 3]; 4] = [[5.0, 3.0, 1.0], [10.0, 20.0, 3.0], [25.0, 20.0, 0.5], [30.0, 0.0, 1.0]];
+    let (cubic_knots, own_knots) =
+        ([0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0], [0.0, 0.0, 0.0, 2.0, 3.0, 3.0, 3.0]);
+    // The plane, its two letters in the order of I and J, and the axes of those letters and of the third.
+    let planes = [("G17", "XY", [0, 1, 2]), ("G18", "XZ", [0, 2, 1]), ("G19", "YZ", [1, 2, 0])];
+    on_a_large_stack(|| {
+        let machine = machine("xyz");
+        for (plane, letters, [a_axis, b_axis, third]) in planes {
+            let [a, b] = letters.chars().collect::<Vec<_>>()[..] else { panic!("two letters") };
+            let third_letter = ["X", "Y", "Z"][third];
+            let point = |p: &[f64; 3]| format!("{a}{} {b}{}", p[0], p[1]);
+            let cubic = format!("G5 {} I9 J2 P-3 Q6", point(&CUBIC[3]));
+            let mut own = format!("G6.2 P3 Q1 {} R1 K0\n", point(&RATIONAL[0]));
+            for (p, knot) in RATIONAL[1..].iter().zip(&own_knots[1..]) {
+                own += &format!("{} R{} K{knot}\n", point(p), p[2]);
+            }
+            own += "K3\nK3\nK3";
+            let cases: [(&str, &[[f64; 3]], &[f64], usize); 2] =
+                [(&cubic, &CUBIC, &cubic_knots, 4), (&own, &RATIONAL, &own_knots, 3)];
+            for (block, points, knots, order) in cases {
+                let text = format!("G61 {plane} F2000\nG0 {third_letter}7\n{block}\nM2\n");
+                let mut driven: Vec<[f64; 3]> = Vec::new();
+                drive(
+                    &machine,
+                    &text,
+                    u64::MAX,
+                    |setpoint| {
+                        if setpoint.span.line >= 3 {
+                            driven.push([setpoint.pose.x, setpoint.pose.y, setpoint.pose.z]);
+                        }
+                    },
+                    |feeder| assert!(feeder.failure().is_none(), "{text}{:?}", feeder.failure()),
+                );
+                assert!(driven.iter().all(|p| (p[third] - 7.0).abs() < 1e-9), "{text}: it leaves its plane");
+                let driven: Vec<[f64; 2]> = driven.iter().map(|p| [p[a_axis], p[b_axis]]).collect();
+                let last = knots[knots.len() - 1];
+                let distance = |p: &[f64; 2], q: &[f64; 2]| maths::hypot(p[0] - q[0], p[1] - q[1]);
+                let curve: Vec<[f64; 2]> = (0..=20_000)
+                    .map(|k| nurbs(points, knots, order, last * f64::from(k) / 20_000.0))
+                    .collect();
+                // One period at 2000 mm/min is 0.034 mm.
+                for (name, place) in [("begin", 0), ("middle", 10_000), ("end", 20_000)] {
+                    let nearest = driven.iter().map(|p| distance(p, &curve[place])).fold(f64::MAX, f64::min);
+                    assert!(nearest < 0.02, "{text}: {nearest} mm from the {name} {:?}", curve[place]);
+                }
+                assert!(distance(driven.last().unwrap(), &curve[20_000]) < 1e-9, "{text}: it ends elsewhere");
+                // From where the spline begins on every setpoint lies on it.
+                let begin = driven.iter().position(|p| distance(p, &curve[0]) < 0.02).unwrap();
+                for p in &driven[begin..] {
+                    let nearest = curve.iter().map(|q| distance(p, q)).fold(f64::MAX, f64::min);
+                    assert!(nearest < 0.02, "{text}: {p:?} is {nearest} mm off");
+                }
+            }
+        }
+    });
+}

@@ -19,6 +19,9 @@ impl State {
         self.check_polar(block)?;
         check_g_codes(block, self)?;
         check_m_codes(block, self.settings.dialect)?;
+        if self.splines.is_open() && self.settings.dialect == Dialect::Pkm {
+            self.check_open_spline(block)?;
+        }
         self.check_words(block)
     }
 
@@ -44,7 +47,8 @@ impl State {
             } else if let Some(other) = other {
                 let kind = ErrorKind::AxisClash { first: Code(other), second: Code(motion) };
                 return Err(block.motion_error(kind));
-            } else if !axes && !polar && !matches!(motion, G0 | G1 | G2 | G3 | G5_2 | G5_3 | 700..=722) {
+            } else if !axes && !polar && !matches!(motion, G0 | G1 | G2 | G3 | G5_2 | G5_3 | G6_2 | 700..=722)
+            {
                 return Err(block.motion_error(ErrorKind::AxisMissing { code: Code(motion) }));
             }
         }
@@ -64,14 +68,16 @@ impl State {
                 return Ok(None);
             }
             // A spline needs its code in every block.
-            if matches!(self.modal.motion, G80 | G5 | G5_1) {
+            if matches!(self.modal.motion, G80 | G5 | G5_1 | G6 | G6_1) {
                 let letter = AXIS_LETTERS.iter().chain(b"@^").copied().find(|letter| block.has(*letter));
                 return Err(block.word_error(letter.unwrap_or(b'X'), ErrorKind::AxisWithoutMotion));
             }
             return Ok(Some(self.modal.motion));
         }
         let repeats_arc = block.has_any(b"IJK") && matches!(self.modal.motion, G2 | G3);
-        Ok(repeats_arc.then_some(self.modal.motion))
+        // A knot alone; LinuxCNC 2.10 wants its G6.2 again.
+        let knot = block.has(b'K') && self.modal.motion == G6_2 && self.settings.dialect == Dialect::Pkm;
+        Ok((repeats_arc || knot).then_some(self.modal.motion))
     }
 
     /// Dialect section 8: a word nobody uses is an error.
@@ -126,30 +132,32 @@ impl State {
         if block.has(b'H') && !(matches!(tool_length, Some(G43 | G43_2)) || motion == G76) {
             return unused(b'H', "G43 G43.2 and G76");
         }
-        let centre = matches!(motion, G2 | G3 | G5 | G5_1 | G87 | G76) || g0 == Some(G10);
+        let centre = matches!(motion, G2 | G3 | G5 | G5_1 | G6 | G6_1 | G87 | G76) || g0 == Some(G10);
         if block.has(b'I') && !(centre || motion == G33_1 || roughing) {
-            return unused(b'I', "G2 G3 G5 G5.1 G10 G33.1 G71 G72 G76 and G87");
+            return unused(b'I', "G2 G3 G5 G5.1 G6 G6.1 G10 G33.1 G71 G72 G76 and G87");
         }
         if block.has(b'J') && !centre {
-            return unused(b'J', "G2 G3 G5 G5.1 G10 G76 and G87");
+            return unused(b'J', "G2 G3 G5 G5.1 G6 G6.1 G10 G76 and G87");
         }
-        if block.has(b'K') && !matches!(motion, G2 | G3 | G33 | G33_1 | G76 | G87) {
-            return unused(b'K', "G2 G3 G33 G33.1 G76 and G87");
+        if block.has(b'K') && !matches!(motion, G2 | G3 | G6_2 | G33 | G33_1 | G76 | G87) {
+            return unused(b'K', "G2 G3 G6.2 G33 G33.1 G76 and G87");
         }
         let cycle = is_cycle(motion);
         if block.has(b'L')
             && !((cycle && motion != G74)
-                || matches!(motion, G5_2 | G76)
+                || matches!(motion, G5_2 | G6_2 | G76)
                 || g0 == Some(G10)
                 || compensation.is_some_and(|code| code != 400)
                 || io == Some(66)
                 || block.has_m(98))
         {
-            return unused(b'L', "G5.2 G10 G41 G42 G73 G76 G81 to G89 M66 and M98");
+            return unused(b'L', "G5.2 G6.2 G10 G41 G42 G73 G76 G81 to G89 M66 and M98");
         }
         if block.has(b'P')
-            && !(matches!(motion, G2 | G3 | G5 | G5_2 | 700 | G74 | G76 | G82 | G84 | G86 | G88 | G89)
-                || matches!(g0, Some(G4 | G10))
+            && !(matches!(
+                motion,
+                G2 | G3 | G5 | G5_2 | G6 | G6_2 | 700 | G74 | G76 | G82 | G84 | G86 | G88 | G89
+            ) || matches!(g0, Some(G4 | G10))
                 || path == Some(G64)
                 || spindle == Some(19)
                 || matches!(block.m(MGroup::Override), Some(50..=53))
@@ -159,11 +167,11 @@ impl State {
         {
             return unused(
                 b'P',
-                "G2 G3 G4 G5 G5.2 G10 G64 G70 G74 G76 G82 G84 G86 G88 G89 M19 M50 to M53 M62 to M66 M98",
+                "G2 G3 G4 G5 G5.2 G6 G6.2 G10 G64 G70 G74 G76 G82 G84 G86 G88 G89 M19 M50 to M53 M62 to M66 M98",
             );
         }
         if block.has(b'Q')
-            && !(matches!(motion, G5 | G73 | G76 | G83)
+            && !(matches!(motion, G5 | G6 | G6_2 | G73 | G76 | G83)
                 || lathe
                 || g0 == Some(G10)
                 || path == Some(G64)
@@ -172,10 +180,10 @@ impl State {
                 || matches!(io, Some(66..=68))
                 || user)
         {
-            return unused(b'Q', "G5 G10 G64 G70 to G73 G76 G83 M19 M61 M66 M67 and M68");
+            return unused(b'Q', "G5 G6 G6.2 G10 G64 G70 to G73 G76 G83 M19 M61 M66 M67 and M68");
         }
         if block.has(b'R')
-            && !(matches!(motion, G2 | G3 | G76)
+            && !(matches!(motion, G2 | G3 | G6_2 | G76)
                 || cycle
                 || roughing
                 || g0 == Some(G10)
@@ -183,7 +191,7 @@ impl State {
                 || spindle == Some(19)
                 || (newer && path == Some(G64)))
         {
-            return unused(b'R', "G2 G3 G10 G41.1 G42.1 G71 to G74 G76 G81 to G89 and M19");
+            return unused(b'R', "G2 G3 G6.2 G10 G41.1 G42.1 G71 to G74 G76 G81 to G89 and M19");
         }
         if block.has(b'$')
             && !(block.has(b'S')

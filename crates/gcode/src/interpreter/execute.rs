@@ -47,6 +47,12 @@ impl State {
             synch |= self.motion(block, out)?;
         }
         if let Some(number) = block.m(MGroup::Stop) {
+            if self.splines.is_open()
+                && matches!(number, 2 | 30 | 99)
+                && self.settings.dialect == Dialect::Pkm
+            {
+                return Err(block.m_error(MGroup::Stop, ErrorKind::NurbsDroppedM { number }));
+            }
             self.finish_compensation(block, out)?;
             return Ok(if self.stop(number, out) {
                 Status::Ended
@@ -107,19 +113,20 @@ impl State {
         if !is_cycle(code) {
             self.cycle_memory.old = None;
         }
-        if !matches!(code, G5 | G5_2 | G5_3) {
-            if self.splines.is_open() && self.settings.dialect == Dialect::Pkm {
-                return Err(block.motion_error(ErrorKind::NurbsDropped { code: Code(code) }));
-            }
+        if self.splines.is_open() && !self.splines.takes(code) && self.settings.dialect == Dialect::Pkm {
+            return Err(block.motion_error(ErrorKind::NurbsDropped { code: Code(code) }));
+        }
+        if !matches!(code, G5 | G5_2 | G5_3 | G6) {
             self.splines.forget();
         }
         match code {
             G0 | G1 => self.straight(code, block, out)?,
             G2 | G3 => self.arc(code, block, out)?,
-            G5 => self.cubic(block, out)?,
-            G5_1 => self.quadratic(block, out)?,
+            G5 | G6 => self.cubic(code, block, out)?,
+            G5_1 | G6_1 => self.quadratic(code, block, out)?,
             G5_2 => self.nurbs_point(block)?,
             G5_3 => self.nurbs_end(block, out)?,
+            G6_2 => self.knot_point(block, out)?,
             G33 => self.synchronized(block, out)?,
             G33_1 => self.rigid_tap(block, out)?,
             G38_2..=G38_5 => {

@@ -35,6 +35,7 @@ use crate::parameters::{self, Parameters};
 use crate::settings::{Dialect, MM_PER_INCH, Settings};
 use crate::source::{LineSource, Place};
 use crate::tool_table::ToolTable;
+pub(crate) use arcs::PlaneAxes;
 use pkm_canon::{Canon, CanonSink, FileId, LengthUnit, Position, Span};
 use queue::Queue;
 use state::State;
@@ -155,6 +156,10 @@ impl Interpreter {
             #[cfg(feature = "alloc")]
             lathe: None,
         }
+    }
+
+    pub(crate) fn settings(&self) -> &Settings {
+        &self.state.settings
     }
 
     /// The parameters.

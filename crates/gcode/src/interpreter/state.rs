@@ -178,6 +178,7 @@ impl State {
             diameter: self.modal.diameter,
             spindles: self.settings.spindles.min(8),
             machine_codes: self.settings.machine_codes,
+            newer: self.settings.is_newer(),
             both_coolants: self.settings.dialect == Dialect::Pkm,
             largest: self.settings.largest_number(),
         }

@@ -251,6 +251,7 @@ impl<'a> StaticCheck<'a> {
             diameter: false,
             spindles: self.settings.spindles.min(8),
             machine_codes: self.settings.machine_codes,
+            newer: self.settings.is_newer(),
             both_coolants: self.settings.dialect == Dialect::Pkm,
             largest: self.settings.largest_number(),
         };

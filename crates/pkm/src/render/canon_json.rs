@@ -62,12 +62,13 @@ fn name_and_arguments(command: &Canon<'_>) -> (&'static str, Value) {
             "ARC_FEED",
             json!({ "end": nine(end), "first_centre": first_centre, "second_centre": second_centre, "turns": turns }),
         ),
-        Canon::NurbsFeed { points, order } => {
+        Canon::NurbsFeed { plane, points, knots, order } => {
             let points: Vec<Value> = points
                 .iter()
                 .map(|p| json!({ "first": p.first, "second": p.second, "weight": p.weight }))
                 .collect();
-            ("NURBS_FEED", json!({ "points": points, "order": order }))
+            let plane = format!("{plane:?}").to_ascii_uppercase();
+            ("NURBS_FEED", json!({ "plane": plane, "points": points, "knots": knots, "order": order }))
         }
         Canon::StraightProbe { end, probe } => {
             ("STRAIGHT_PROBE", json!({ "end": nine(end), "away": probe.away, "must_trip": probe.must_trip }))

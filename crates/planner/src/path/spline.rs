@@ -1,8 +1,8 @@
-//! Splines of G5, G5.1 and G5.2: clamped uniform NURBS in a plane, cut into cubics with continuous dX/ds.
+//! Splines of G5, G5.1, G5.2 and G6.2: clamped NURBS in a plane, cut into cubics with continuous dX/ds.
 //!
 //! Source: L. Piegl, W. Tiller, The NURBS Book, 2nd ed., algorithms A4.1 (evaluation) and A3.2 (derivative), written as
-//! de Boor's triangle on homogeneous coordinates. Knots are those of RS274/NGC's `NURBS_FEED`: `order` zeros, then one
-//! step per span, then `order` times the end. A polynomial spline of order 3 or 4 is reproduced exactly; a rational or
+//! de Boor's triangle on homogeneous coordinates. Without knots of its own a spline has those of RS274/NGC's `NURBS_FEED`:
+//! `order` zeros, then one step per span, then `order` times the end. A polynomial spline of order 3 or 4 is reproduced exactly; a rational or
 //! higher one within 1e-9 mm, by halving its spans.
 
 use super::{Blend, Point, Vector, combine, norm3};
@@ -24,28 +24,50 @@ type Homogeneous = [f64; 3];
 #[derive(Debug, Clone, Copy)]
 pub struct Spline<'a> {
     points: &'a [ControlPoint],
+    /// Empty: uniform.
+    knots: &'a [f64],
     order: usize,
     unit_mm: f64,
 }
 
 impl<'a> Spline<'a> {
-    /// `None` if there are fewer points than the order, the order is not 2 to [`MAX_ORDER`], or a weight is not > 0.
-    pub fn new(points: &'a [ControlPoint], order: u32, unit_mm: f64) -> Option<Self> {
+    /// `None` if there are fewer points than the order, the order is not 2 to [`MAX_ORDER`], a weight is not > 0, or there are
+    /// knots but not points + order of them, they fall, or the first or last `order` are not equal.
+    pub fn new(points: &'a [ControlPoint], knots: &'a [f64], order: u32, unit_mm: f64) -> Option<Self> {
         let order = usize::try_from(order).ok()?;
         let good = (2..=MAX_ORDER).contains(&order)
             && points.len() >= order
             && points.iter().all(|p| p.weight > 0.0 && p.first.is_finite() && p.second.is_finite());
-        good.then_some(Self { points, order, unit_mm })
+        let are_equal = |some: Option<&[f64]>| {
+            some.is_some_and(|some| some.windows(2).all(|pair| matches!(pair, [a, b] if a == b)))
+        };
+        let clamped = knots.is_empty()
+            || knots.len() == points.len() + order
+                && knots.iter().all(|knot| knot.is_finite())
+                && knots.windows(2).all(|pair| matches!(pair, [a, b] if a <= b))
+                && are_equal(knots.get(..order))
+                && are_equal(knots.get(points.len()..))
+                && knots.first() < knots.last();
+        (good && clamped).then_some(Self { points, knots, order, unit_mm })
     }
 
-    /// Number of knot spans: the parameter runs from 0 to this.
+    /// Number of knot spans, those of no width included.
     fn spans(&self) -> usize {
         self.points.len() + 1 - self.order
     }
 
     /// The i-th knot, clamped.
     fn knot(&self, i: usize) -> f64 {
-        i.saturating_sub(self.order - 1).min(self.spans()) as f64
+        match self.knots.get(i) {
+            Some(knot) => *knot,
+            None => i.saturating_sub(self.order - 1).min(self.spans()) as f64,
+        }
+    }
+
+    /// Where a knot span begins, and how wide it is.
+    fn span(&self, span: usize) -> (f64, f64) {
+        let begin = self.knot(span + self.order - 1);
+        (begin, self.knot(span + self.order) - begin)
     }
 
     fn homogeneous(&self, i: usize) -> Homogeneous {
@@ -93,14 +115,24 @@ impl<'a> Spline<'a> {
         const PIECES: u8 = 8;
         let mut sum = 0.0;
         for span in 0..self.spans() {
+            let (begin, width) = self.span(span);
+            if width == 0.0 {
+                continue;
+            }
             for k in 0..=PIECES {
-                let t = span as f64 + f64::from(k) / f64::from(PIECES);
+                let t = begin + width * f64::from(k) / f64::from(PIECES);
                 let [x, y] = self.at(span, t).1;
                 let factor = if k == 0 || k == PIECES { 1.0 } else { 2.0 + 2.0 * f64::from(k % 2) };
-                sum += factor * sqrt(x * x + y * y) / (3.0 * f64::from(PIECES));
+                sum += width * factor * sqrt(x * x + y * y) / (3.0 * f64::from(PIECES));
             }
         }
         sum
+    }
+
+    /// The first control point: where the spline begins, in the plane, mm.
+    pub fn begin(&self) -> [f64; 2] {
+        let [x, y, w] = self.homogeneous(0);
+        [x / w, y / w]
     }
 
     /// Calls `emit` with the cubics of the spline in order. `lift` takes a place or a direction (`true`) in the plane
@@ -111,7 +143,7 @@ impl<'a> Spline<'a> {
             return;
         }
         // One scale for the whole spline, so that dX/ds is continuous from cubic to cubic.
-        let per_t = length / self.spans() as f64;
+        let per_t = length / (self.knot(self.points.len()) - self.knot(self.order - 1));
         let end = |span: usize, t: f64| {
             let (place, slope) = self.at(span, t);
             Point {
@@ -121,11 +153,15 @@ impl<'a> Spline<'a> {
             }
         };
         for span in 0..self.spans() {
+            let (begin, whole) = self.span(span);
+            if whole == 0.0 {
+                continue;
+            }
             let mut parts = 1_u32;
             for halving in 0..=HALVINGS {
-                let width = 1.0 / f64::from(parts);
+                let width = whole / f64::from(parts);
                 let cubic = |k: u32| {
-                    let t = span as f64 + f64::from(k) * width;
+                    let t = begin + f64::from(k) * width;
                     (t, Blend::hermite(&end(span, t), &end(span, t + width), width * per_t))
                 };
                 let fits = (0..parts).all(|k| {
@@ -162,7 +198,7 @@ mod tests {
         let points =
             [point(0.0, 0.0, 1.0), point(0.0, 10.0, 1.0), point(20.0, 10.0, 1.0), point(20.0, 0.0, 1.0)];
         let mut pieces = 0;
-        Spline::new(&points, 4, 1.0).unwrap().cubics(lift, |cubic| {
+        Spline::new(&points, &[], 4, 1.0).unwrap().cubics(lift, |cubic| {
             pieces += 1;
             // Bernstein form at t = 1/3.
             let got = cubic.at(cubic.length / 3.0).position;
@@ -180,7 +216,7 @@ mod tests {
         let points = [point(10.0, 0.0, 1.0), point(10.0, 10.0, w), point(0.0, 10.0, 1.0)];
         let mut last: Option<Blend> = None;
         let mut pieces = 0;
-        Spline::new(&points, 3, 1.0).unwrap().cubics(lift, |cubic| {
+        Spline::new(&points, &[], 3, 1.0).unwrap().cubics(lift, |cubic| {
             pieces += 1;
             for k in 0..=20 {
                 let p = cubic.at(cubic.length * f64::from(k) / 20.0).position;
@@ -201,7 +237,7 @@ mod tests {
         let points: [ControlPoint; 7] =
             core::array::from_fn(|i| point(5.0 * i as f64, [0.0, 4.0, -3.0, 8.0, 2.0, -1.0, 0.5][i], 1.0));
         let mut last: Option<Blend> = None;
-        Spline::new(&points, 4, 1.0).unwrap().cubics(lift, |cubic| {
+        Spline::new(&points, &[], 4, 1.0).unwrap().cubics(lift, |cubic| {
             let begin = cubic.at(0.0);
             match last {
                 None => assert!(begin.position[0].abs() + begin.position[1].abs() < 1e-12),
