@@ -227,8 +227,7 @@ fn splines_are_driven_in_their_plane() {
                 own += &format!("{} R{} K{knot}\n", point(p), p[2]);
             }
             own += "K3\nK3\nK3";
-            let cases: [(&str, &[[f64; 3]], &[f64], usize); 2] =
-                [(&cubic, &CUBIC, &cubic_knots, 4), (&own, &RATIONAL, &own_knots, 3)];
+            let cases = [(&cubic, CUBIC, &cubic_knots[..], 4), (&own, RATIONAL, &own_knots[..], 3)];
             for (block, points, knots, order) in cases {
                 let text = format!("G61 {plane} F2000\nG0 {third_letter}7\n{block}\nM2\n");
                 let mut driven: Vec<[f64; 3]> = Vec::new();
@@ -248,7 +247,7 @@ fn splines_are_driven_in_their_plane() {
                 let last = knots[knots.len() - 1];
                 let distance = |p: &[f64; 2], q: &[f64; 2]| maths::hypot(p[0] - q[0], p[1] - q[1]);
                 let curve: Vec<[f64; 2]> = (0..=20_000)
-                    .map(|k| nurbs(points, knots, order, last * f64::from(k) / 20_000.0))
+                    .map(|k| nurbs(&points, knots, order, last * f64::from(k) / 20_000.0))
                     .collect();
                 // One period at 2000 mm/min is 0.034 mm.
                 for (name, place) in [("begin", 0), ("middle", 10_000), ("end", 20_000)] {
