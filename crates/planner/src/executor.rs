@@ -146,7 +146,6 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// A dwell takes whole servo periods; the last one may be cut short.
     fn begin_period(&mut self, held: bool) {
-        let period_ns = pkm_kins::maths::round(self.settings.servo_period_s * 1e9) as u64;
         let at_node = self.executor.is_at_node();
         // Held or not: what averages the setpoints goes on.
         let settles = self.executor.settle > 0;
@@ -155,6 +154,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let dwells = match self.nodes.front_mut() {
             Some(node) if at_node && !waits && node.dwell_ns > 0 => {
                 if !held {
+                    let period_ns = pkm_kins::maths::round(self.settings.servo_period_s * 1e9) as u64;
                     node.dwell_ns = node.dwell_ns.saturating_sub(period_ns);
                     // The dwell was a block of its own.
                     self.executor.stepped &= node.dwell_ns > 0;
@@ -409,8 +409,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let speed = sqrt(self.executor.x);
         let pose = Pose::from_array(point.position);
         let velocity = Pose::from_array(point.first.map(|d| d * speed));
-        let motion = &self.kinematics.motion(&pose, &velocity, &Pose::ZERO);
-        let motion = motion.as_ref().map_err(|&error| PlanError {
+        let motion = self.kinematics.motion(&pose, &velocity, &Pose::ZERO);
+        let motion = motion.map_err(|error| PlanError {
             kind: PlanErrorKind::Unreachable(error),
             span: piece.span,
             pose,

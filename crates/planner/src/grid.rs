@@ -8,6 +8,7 @@ use crate::PlanError;
 use crate::interval::fastest_entry;
 use crate::limits::{FASTEST, Rows, Sample};
 use crate::operator::Panel;
+use crate::pair::{higher, lower};
 use crate::path::Geometry;
 use crate::planner::{Piece, Planner};
 use pkm_canon::Span;
@@ -65,7 +66,7 @@ impl<const R: usize> Node<R> {
     /// The same without regard to a stop.
     pub(crate) fn speed_cap(&self, panel: Panel) -> f64 {
         let hard = if self.rapid { self.hard * panel.rapid * panel.rapid } else { self.hard };
-        hard.min(self.feed * panel.feed * panel.feed)
+        lower(hard, self.feed * panel.feed * panel.feed)
     }
 }
 
@@ -178,17 +179,19 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     }
 
     fn cut(&mut self, budget: usize) -> Result<(), PlanError> {
-        let target = (self.nodes.len() + budget).min(NODES);
+        let mut room = budget.min(NODES - self.nodes.len());
         // Every turn adds a node or goes on to the next piece.
         for _ in 0..2 * budget {
-            if self.nodes.len() >= target {
+            if room == 0 {
                 break;
             }
             let Some(&Piece { to, open, .. }) = self.piece(self.grid.piece) else { break };
-            if self.nodes.is_empty() {
-                self.first_node()?;
-            } else if self.grid.s < to {
+            if self.grid.s < to && !self.nodes.is_empty() {
                 self.march()?;
+                room -= 1;
+            } else if self.nodes.is_empty() {
+                self.first_node()?;
+                room -= 1;
             } else if open || !self.next_piece()? {
                 break;
             }
@@ -232,9 +235,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     /// The end of a piece: what begins here joins the last node. False if nothing follows yet.
     fn next_piece(&mut self) -> Result<bool, PlanError> {
         let number = self.grid.piece + 1;
-        let (stop, span) = self.piece(self.grid.piece).map_or((false, None), |p| (p.stop, Some(p.span)));
         let index = number.wrapping_sub(self.first_piece) as usize;
         let Some(next) = self.pieces.get(index) else { return Ok(false) };
+        let (stop, span) = self.piece(self.grid.piece).map_or((false, None), |p| (p.stop, Some(p.span)));
         let (from, rapid, dwell_ns) = (next.from, next.rapid, next.dwell_ns);
         let still = matches!(next.geometry, Geometry::Hold(_));
         // A new source line is a new block; a dwell always is.
@@ -279,10 +282,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             let shortest = period * sqrt(scales.speed) / NODES_PER_PERIOD;
             if step <= shortest || scales.change <= CHANGE {
                 // What would have been right here is right for the next, or nearly so.
-                next_guess = (step * (0.9 * CHANGE / scales.change).min(4.0)).max(0.75 * shortest);
+                next_guess = higher(0.75 * shortest, step * lower(4.0, 0.9 * CHANGE / scales.change));
                 // A short piece says little of what the path could bear; a straight one nothing.
                 if step >= remaining || scales.change == 0.0 {
-                    next_guess = next_guess.max(guess);
+                    next_guess = higher(next_guess, guess);
                 }
                 break;
             }
@@ -302,14 +305,14 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let number = self.grid.piece;
         let Some(tail) = self.nodes.back_mut() else { return Ok(()) };
         tail.length = step;
-        tail.hard = tail.hard.min(between);
+        tail.hard = lower(tail.hard, between);
         let distance = tail.distance + step;
-        let mut hard = sample.hard.min(between);
+        let mut hard = lower(sample.hard, between);
         if let Some(earlier) = self.nodes.len().checked_sub(NODES_PER_TICK)
             && let Some(earlier) = self.nodes.get(earlier)
         {
             let speed = (distance - earlier.distance) / period;
-            hard = hard.min(speed * speed);
+            hard = lower(hard, speed * speed);
         }
         let node = Node {
             piece: number,
@@ -373,11 +376,14 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             });
             return true;
         }
+        if known >= all {
+            return false;
+        }
         let soon = self.nodes.get(2 * NODES_PER_TICK).or(self.nodes.back());
         let settled = soon.is_none_or(|node| self.grid.settled >= node.distance);
         // A pass over fewer new nodes than it plans anew is worth it only when no more come.
         let early = all - known < self.grid.depth.min(STRETCH) && self.grows();
-        if known >= all || settled || early {
+        if settled || early {
             return false;
         }
         // Each pass takes in as much more as the last one had to plan again: all in all no more than about three times
@@ -408,16 +414,20 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn continue_pass(&mut self, mut budget: usize) -> usize {
         let rows = self.limits.rows();
         let Some(mut pass) = self.grid.pass.take() else { return budget };
+        // From the last node taken in to the front.
+        let (first, then) = self.nodes.as_mut_slices();
+        let skipped = (first.len() + then.len()).saturating_sub(pass.next + 1);
+        let mut nodes = then.iter_mut().rev().chain(first.iter_mut().rev()).skip(skipped);
+        let mut after: Option<&Node<R>> = nodes.next().map(|node| &*node);
         while pass.next > pass.first.max(1) {
             if budget == 0 {
                 self.grid.pass = Some(pass);
                 return 0;
             }
-            let i = pass.next - 1;
-            let (Some(node), Some(after)) = (self.nodes.get(i), self.nodes.get(pass.next)) else { break };
-            let cap = node.cap(pass.panel).min(FASTEST);
+            let (Some(node), Some(next)) = (nodes.next(), after) else { break };
+            let cap = lower(node.cap(pass.panel), FASTEST);
             let entry = if cap > 0.0 {
-                fastest_entry(&node.right, &after.left, rows, node.length, cap, after.entry)
+                fastest_entry(&node.right, &next.left, rows, node.length, cap, next.entry)
             } else {
                 0.0
             };
@@ -425,7 +435,6 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             self.work.planned += 1;
             let known = pass.next < pass.known;
             pass.depth += usize::from(known);
-            let Some(node) = self.nodes.get_mut(i) else { break };
             let same = known && entry == node.entry;
             node.entry = entry;
             // At its cap a node asks nothing of what follows; and one that a longer queue leaves as it is, no longer
@@ -436,7 +445,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             if same {
                 break;
             }
-            pass.next = i;
+            pass.next -= 1;
+            after = Some(node);
         }
         self.grid.settled = pass.settled;
         if pass.anew {

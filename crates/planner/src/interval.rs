@@ -4,7 +4,7 @@
 //! both ends are then linear in (x, x′). The set they allow is convex and holds (0, 0): stopping is always possible.
 
 use crate::limits::Rows;
-use crate::pair::{Pair, each, higher, highest, lower, lowest, with};
+use crate::pair::{Pair, each, higher, highest, lower, with};
 
 /// Calls `look` with a and b of every strip |a·x + b·x′| ≤ h, where h = 2 Δs; two rows at a time.
 #[inline(always)]
@@ -15,11 +15,11 @@ fn borders<const R: usize>(
     h: f64,
     mut look: impl FnMut(Pair, Pair),
 ) {
-    for (p, q) in left.pairs(rows) {
-        look(with(p, q, |p, q| h * q - p), p);
-    }
-    for (p, q) in right.pairs(rows) {
-        look(each(p, |p| -p), with(p, q, |p, q| p + h * q));
+    for ((p, q), (p_end, q_end)) in left.pairs(rows).zip(right.pairs(rows)) {
+        let (start, end) = (with(p, q, |p, q| h * q - p), with(p_end, q_end, |p, q| p + h * q));
+        for (a, b) in [(start, p), (each(p_end, |p| -p), end)] {
+            look(a, b);
+        }
     }
 }
 
@@ -28,6 +28,46 @@ fn borders<const R: usize>(
 struct Lines {
     slope: Pair,
     half: Pair,
+}
+
+/// Lowest and (its negative, a maximum like the lowest) highest x′ at an x, and where the same borders are at 0.
+struct Gap {
+    low: Pair,
+    low_at_0: Pair,
+    minus_high: Pair,
+    minus_high_at_0: Pair,
+}
+
+impl Gap {
+    fn below(next_cap: f64) -> Self {
+        Self {
+            low: [0.0; 2],
+            low_at_0: [0.0; 2],
+            minus_high: [-next_cap; 2],
+            minus_high_at_0: [-next_cap; 2],
+        }
+    }
+
+    #[inline(always)]
+    fn narrow(&mut self, lines: &Lines, x: f64) {
+        for k in [0, 1] {
+            let (middle, at_0) = (lines.slope[k] * x, -lines.half[k]);
+            let (bottom, minus_top) = (at_0 + middle, at_0 - middle);
+            self.low_at_0[k] = if bottom > self.low[k] { at_0 } else { self.low_at_0[k] };
+            self.minus_high_at_0[k] =
+                if minus_top > self.minus_high[k] { at_0 } else { self.minus_high_at_0[k] };
+            self.low[k] = higher(self.low[k], bottom);
+            self.minus_high[k] = higher(self.minus_high[k], minus_top);
+        }
+    }
+
+    /// How far it is open at x and at 0.
+    fn width(&self) -> (f64, f64) {
+        let of_both = |at: Pair, at_0: Pair| if at[1] > at[0] { (at[1], at_0[1]) } else { (at[0], at_0[0]) };
+        let (low, low_at_0) = of_both(self.low, self.low_at_0);
+        let (minus_high, minus_high_at_0) = of_both(self.minus_high, self.minus_high_at_0);
+        (-minus_high - low, -minus_high_at_0 - low_at_0)
+    }
 }
 
 /// The largest x ≤ `cap` from which some x′ ≤ `next_cap` can be reached within all strips.
@@ -64,6 +104,7 @@ pub(crate) fn fastest_entry<const R: usize>(
     const NONE: Lines = Lines { slope: [0.0; 2], half: [f64::INFINITY; 2] };
     let mut lines = [NONE; R];
     let mut slots = lines.iter_mut();
+    let mut gap = Gap::below(next_cap);
     borders(left, right, rows, h, |a, b| {
         let Some(slot) = slots.next() else { return };
         let part = each(b, |b| 1.0 / b);
@@ -78,29 +119,13 @@ pub(crate) fn fastest_entry<const R: usize>(
                 }
             }
         }
+        gap.narrow(slot, x);
     });
     // Every step leaves at least one of the 4·rows + 2 borders behind for good.
     for _ in 0..4 * R + 2 {
-        // Highest and lowest x′ at x, and where the same borders are at 0.
-        let (mut low, mut high) = ([0.0; 2], [next_cap; 2]);
-        let (mut low_at_0, mut high_at_0) = ([0.0; 2], [next_cap; 2]);
-        for line in lines.iter().take(2 * rows.div_ceil(2)) {
-            for k in [0, 1] {
-                let (middle, half) = (line.slope[k] * x, line.half[k]);
-                let (bottom, top) = (middle - half, middle + half);
-                let (above, below) = (bottom > low[k], top < high[k]);
-                low[k] = if above { bottom } else { low[k] };
-                low_at_0[k] = if above { -half } else { low_at_0[k] };
-                high[k] = if below { top } else { high[k] };
-                high_at_0[k] = if below { half } else { high_at_0[k] };
-            }
-        }
-        let (low, low_at_0) = if low[1] > low[0] { (low[1], low_at_0[1]) } else { (low[0], low_at_0[0]) };
-        let (high, high_at_0) =
-            if high[1] < high[0] { (high[1], high_at_0[1]) } else { (high[0], high_at_0[0]) };
-        // The gap between the two is open at 0 and, where it is closed at x, closes in between.
-        let (gap, gap_at_0) = (high - low, high_at_0 - low_at_0);
-        let next = lower(if gap >= 0.0 { x } else { x * (gap_at_0 / (gap_at_0 - gap)) }, upright);
+        // The gap is open at 0 and, where it is closed at x, closes in between.
+        let (open, open_at_0) = gap.width();
+        let next = lower(if open >= 0.0 { x } else { x * (open_at_0 / (open_at_0 - open)) }, upright);
         // What is left of the way is rounding.
         if !(next < x * (1.0 - 1e-14)) {
             return lower(x, next);
@@ -108,6 +133,10 @@ pub(crate) fn fastest_entry<const R: usize>(
         x = higher(0.0, next);
         if reached(x) {
             return x;
+        }
+        gap = Gap::below(next_cap);
+        for pair in lines.iter().take(2 * rows.div_ceil(2)) {
+            gap.narrow(pair, x);
         }
     }
     x
@@ -125,17 +154,18 @@ pub(crate) fn exits<const R: usize>(
     // Where a joint's q′ passes zero, b is all rounding and so is the room at the limit: without a little slack their
     // quotient is anything.
     const SLACK: f64 = 1e-9;
-    let (mut low, mut high) = ([0.0; 2], [f64::INFINITY; 2]);
+    // The negative of `high` is a maximum too: one and the same operation for all.
+    let (mut low, mut minus_high) = ([0.0; 2], [f64::NEG_INFINITY; 2]);
     let h = 2.0 * length;
     borders(left, right, rows, h, |a, b| {
         // Where b is 0, what comes out is infinite or no number, and asks for nothing.
         let part = each(b, |b| 1.0 / b);
         let middle = with(a, part, |a, part| -a * x * part);
         let half = each(part, |part| h * (1.0 + SLACK) * part.abs());
-        high = with(high, with(middle, half, |middle, half| middle + half), lower);
         low = with(low, with(middle, half, |middle, half| middle - half), higher);
+        minus_high = with(minus_high, with(middle, half, |middle, half| -middle - half), higher);
     });
-    (highest(low), lowest(high))
+    (highest(low), -highest(minus_high))
 }
 
 /// The accelerations that the strips at both ends allow for every x from `x_low` to `x_high`: (hardest braking,
@@ -147,21 +177,23 @@ pub(crate) fn accelerations<const R: usize>(
     x_low: f64,
     x_high: f64,
 ) -> (f64, f64) {
-    let (mut low, mut high) = ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
+    let (mut low, mut minus_high) = ([f64::NEG_INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for side in [left, right] {
         for (p, q) in side.pairs(rows) {
             // |p a + q x| ≤ 1 at both x.
             let q = with(p, q, |p, q| if p >= 0.0 { q } else { -q });
             let p = each(p, f64::abs);
             let (at_low, at_high) = (each(q, |q| q * x_low), each(q, |q| q * x_high));
-            let most = with(with(at_low, at_high, higher), p, |most, p| (1.0 - most) / p);
-            let least = with(with(at_low, at_high, lower), p, |least, p| (-1.0 - least) / p);
-            high = with(high, with(most, p, |most, p| if p > 0.0 { most } else { f64::INFINITY }), lower);
-            low =
-                with(low, with(least, p, |least, p| if p > 0.0 { least } else { f64::NEG_INFINITY }), higher);
+            let most = with(at_low, at_high, higher);
+            let minus_least = with(each(at_low, |q| -q), each(at_high, |q| -q), higher);
+            // Where p is 0, nothing is asked for.
+            let part =
+                |room: Pair| with(room, p, |room, p| if p > 0.0 { room / p } else { f64::NEG_INFINITY });
+            low = with(low, part(each(minus_least, |q| q - 1.0)), higher);
+            minus_high = with(minus_high, part(each(most, |q| q - 1.0)), higher);
         }
     }
-    (highest(low), lowest(high))
+    (highest(low), -highest(minus_high))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! x = ṡ², its speed is |q′|√x and its acceleration q′ s̈ + q″ x. Rows are stored divided by their acceleration
 //! limit, so each asks for |d₁ s̈ + d₂ x| ≤ 1. (Bobrow, Dubowsky, Gibson 1985; Pham & Pham, TOPP-RA, 2018.)
 
-use crate::pair::{Pair, higher, highest, lower, lowest, with};
+use crate::pair::{Pair, higher, highest, lower, with};
 use crate::path::{FeedGroup, feed_length};
 use crate::planner::Piece;
 use crate::{PlanError, PlanErrorKind};
@@ -213,28 +213,23 @@ impl<const R: usize> Limits<R> {
         }
         sample.feed = piece.feed.cap(&point.first);
         let (mut fastest, mut within) = (0.0, true);
-        let joints = motion.position.iter().zip(&motion.velocity).zip(&motion.acceleration);
-        let axes = self
-            .axes
-            .iter()
-            .map(|limits| (pose.get(limits.axis), first.get(limits.axis), second.get(limits.axis)));
-        let joints = joints.take(self.joints.len()).map(|((q, d1), d2)| (*q, *d1, *d2));
-        let scales = self.per_velocity.iter().zip(&self.per_acceleration);
-        let strips = sample.rows.first.iter_mut().zip(&mut sample.rows.second);
-        let places = sample.speed.iter_mut().zip(&mut sample.position);
-        let ends = self.lowest.iter().zip(&self.highest);
-        let rows = strips.zip(places).zip(scales).zip(ends);
-        for (
-            ((((strip, bend), (speed, place)), (per_velocity, per_acceleration)), (low, high)),
-            (q, d1, d2),
-        ) in rows.zip(joints.chain(axes))
-        {
-            *strip = d1 * per_acceleration;
-            *bend = d2 * per_acceleration;
-            *speed = d1 * per_velocity;
-            *place = q;
+        let mut set = |row: usize, q: f64, d1: f64, d2: f64| {
+            let speed = d1 * self.per_velocity[row];
+            sample.rows.first[row] = d1 * self.per_acceleration[row];
+            sample.rows.second[row] = d2 * self.per_acceleration[row];
+            sample.speed[row] = speed;
+            sample.position[row] = q;
             fastest = higher(fastest, speed.abs());
-            within &= q >= *low && q <= *high;
+            within &= q >= self.lowest[row] && q <= self.highest[row];
+        };
+        // There are no more joints than rows; that it is said here spares the loop its checks.
+        let joints = self.joints.len().min(R).min(MAX_JOINTS);
+        for row in 0..joints {
+            set(row, motion.position[row], motion.velocity[row], motion.acceleration[row]);
+        }
+        for (limits, row) in self.axes.iter().zip(joints..R) {
+            let axis = limits.axis;
+            set(row, pose.get(axis), first.get(axis), second.get(axis));
         }
         sample.hard = speed_cap(fastest);
         if within { Ok(()) } else { self.check_travel(&pose, &motion.position).map_err(fail) }
@@ -259,8 +254,8 @@ impl<const R: usize> Limits<R> {
         // As a rule neither q′ nor q″ of any row changes its sign.
         let opposite = |a: &[f64; R], b: &[f64; R]| {
             let products = a.as_chunks().0.iter().zip(b.as_chunks().0).take(self.rows().div_ceil(2));
-            lowest(products.fold([0.0; 2], |least, (&a, &b)| with(least, with(a, b, |a, b| a * b), lower)))
-                < 0.0
+            highest(products.fold([0.0; 2], |most, (&a, &b)| with(most, with(a, b, |a, b| -a * b), higher)))
+                > 0.0
         };
         let (bends, turns) = (opposite(&a.rows.second, &b.rows.second), opposite(&a.speed, &b.speed));
         if !(bends || turns) {

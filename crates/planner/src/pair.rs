@@ -27,14 +27,8 @@ pub(crate) fn lower(a: f64, b: f64) -> f64 {
     if b < a { b } else { a }
 }
 
-/// The highest of both and `a`.
+/// The higher one of a pair.
 #[inline(always)]
 pub(crate) fn highest(a: Pair) -> f64 {
     higher(a[0], a[1])
-}
-
-/// The lowest of both.
-#[inline(always)]
-pub(crate) fn lowest(a: Pair) -> f64 {
-    lower(a[0], a[1])
 }

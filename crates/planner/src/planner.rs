@@ -369,7 +369,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let length = last.geometry.length();
         last.open = false;
         last.to = length;
-        let (e1, e2) = (last.geometry.at(length).first, next.geometry.at(0.0).first);
+        let (e1, e2) = (last.geometry.tangent(length), next.geometry.tangent(0.0));
         let turn = combine(&e2, &e1, |b, a| (b - a).abs()).into_iter().fold(0.0, f64::max);
         // A seam smoother than this jumps a joint's speed by less than rounding shows.
         const SMOOTH: f64 = 1e-9;
@@ -424,10 +424,13 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// True when everything pushed has been driven and the machine is at rest.
     pub fn is_idle(&self) -> bool {
+        if !self.executor.has_settled() || self.nodes.len() > 1 {
+            return false;
+        }
         let gridded = self.grid.piece + 1 >= self.first_piece + self.pieces.len() as u64;
         let at_end = self.pieces.back().is_none_or(|last| !last.open && (gridded && self.grid.s >= last.to));
         let dwelling = self.nodes.front().is_some_and(|node| node.dwell_ns > 0);
-        at_end && self.nodes.len() <= 1 && self.executor.has_settled() && !dwelling
+        at_end && !dwelling
     }
 
     /// Empties the queue; the machine must be at rest. The queue then ends where the machine is.

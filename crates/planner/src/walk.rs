@@ -16,7 +16,7 @@ const MOST_PLACES: u32 = 64;
 /// Places that a push looks at on a move.
 pub(crate) fn places(geometry: &Geometry) -> u32 {
     let length = geometry.length();
-    let first = geometry.at(0.0).first;
+    let first = geometry.tangent(0.0);
     let turning = crate::path::norm3(&first, 3) * length / SPACING_RAD;
     let count = maths::ceil((length / SPACING_MM).max(turning));
     if count < f64::from(MOST_PLACES) { (count as u32).max(1) } else { MOST_PLACES }

@@ -40,7 +40,7 @@ impl Blend {
     /// Blends the end of `before` into the start of `after`. Returns how much is cut off on each side (in either's
     /// parameter) with the blend; `None` if nothing can be cut off or the direction turns right back.
     pub fn new(before: &Geometry, after: &Geometry, tolerance: Tolerance) -> Option<(f64, Self)> {
-        let (e1, e2) = (before.at(before.length()).first, after.at(0.0).first);
+        let (e1, e2) = (before.tangent(before.length()), after.tangent(0.0));
         let turn = combine(&e2, &e1, |b, a| b - a);
         let back = combine(&e2, &e1, |b, a| b + a);
         if norm3(&back, 0).max(norm3(&back, 6)).max(norm3(&back, 3)) < 1e-6 {

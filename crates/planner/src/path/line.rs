@@ -29,6 +29,7 @@ impl Line {
         })
     }
 
+    #[inline]
     pub(super) fn at(&self, s: f64) -> Point {
         let mut position = self.start;
         for (x, d) in position.iter_mut().zip(&self.direction) {

@@ -63,7 +63,16 @@ impl Geometry {
         }
     }
 
+    /// dX/ds at s.
+    pub(crate) fn tangent(&self, s: f64) -> Vector {
+        match self {
+            Geometry::Line(line) => line.direction,
+            _ => self.at(s).first,
+        }
+    }
+
     /// Position and derivatives at s.
+    #[inline]
     pub fn at(&self, s: f64) -> Point {
         match self {
             Geometry::Line(line) => line.at(s),
