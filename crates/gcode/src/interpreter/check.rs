@@ -94,6 +94,21 @@ impl State {
         if matches!(motion, G2 | G3) && block.has(b'P') {
             turns_of(block)?;
         }
+        let needed: &[u8] = match motion {
+            G33 | G33_1 => b"K",
+            G76 => b"PIJK",
+            _ => b"",
+        };
+        // Before anything of the block is executed (checked with rs274 2.9).
+        if let Some(letter) = needed.iter().copied().find(|letter| !block.has(*letter)) {
+            let kind = ErrorKind::WordMissing { letter: letter.into(), code: Code(motion) };
+            return Err(block.motion_error(kind));
+        }
+        if motion == G76
+            && let Some(value) = block.get(b'P').filter(|pitch| *pitch < 0.0)
+        {
+            return Err(block.word_error(b'P', ErrorKind::NegativeWord { letter: 'P', value }));
+        }
         if spindle == Some(19) {
             // Before anything of the block is executed; Q only after the turn (checked with rs274 2.9).
             let wrong = |letter: u8, value| {

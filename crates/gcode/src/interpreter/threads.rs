@@ -21,15 +21,10 @@ impl State {
         }
     }
 
-    fn pitch_word(&self, code: GCode, block: &Block) -> Result<f64, Error> {
-        let missing = ErrorKind::WordMissing { letter: 'K', code: Code(code) };
-        block.get(b'K').ok_or_else(|| block.motion_error(missing))
-    }
-
     /// G33 K: a line with K units per turn.
     pub(crate) fn synchronized(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         let spindle = self.needs_turning_spindle(G33, block)?;
-        let pitch = self.pitch_word(G33, block)?;
+        let pitch = block.get(b'K').unwrap_or(0.0);
         let end = self.end_point(block)?;
         out.emit(Canon::StartSpeedFeedSync { spindle, feed_per_turn: pitch, velocity_mode: 0 });
         out.emit(Canon::StraightFeed(Position::from_array(end)));
@@ -42,7 +37,7 @@ impl State {
     /// G33.1 K [I]: rigid tap to the point and back.
     pub(crate) fn rigid_tap(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         let spindle = self.needs_turning_spindle(G33_1, block)?;
-        let pitch = self.pitch_word(G33_1, block)?;
+        let pitch = block.get(b'K').unwrap_or(0.0);
         let end = self.end_point(block)?;
         let retract_scale = block.get(b'I').unwrap_or(1.0);
         // LinuxCNC 2.9 takes any (checked with rs274 2.9).
@@ -60,19 +55,18 @@ impl State {
         Ok(())
     }
 
-    /// G76: threading in the XZ plane, in passes of falling depth.
+    /// G76: threading along X and Z, in passes of falling depth. LinuxCNC looks neither at the plane nor at Y, and takes
+    /// an R below 1 for 1 (checked with rs274 2.9).
     pub(crate) fn thread(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
-        let word = |letter: u8| {
-            let missing = ErrorKind::WordMissing { letter: letter.into(), code: Code(G76) };
-            block.get(letter).ok_or_else(|| block.motion_error(missing))
-        };
-        if self.modal.plane != Plane::Xz {
+        let pkm = self.settings.dialect == Dialect::Pkm;
+        if pkm && self.modal.plane != Plane::Xz {
             return Err(block.motion_error(ErrorKind::ThreadPlane));
         }
         if self.modal.compensation.is_some() {
             return Err(block.motion_error(ErrorKind::CcOn { what: "G76" }));
         }
-        let (pitch, mut i, mut j, mut k) = (word(b'P')?, word(b'I')?, word(b'J')?, word(b'K')?);
+        let spindle = self.needs_turning_spindle(G76, block)?;
+        let [pitch, mut i, mut j, mut k] = b"PIJK".map(|letter| block.get(letter).unwrap_or(0.0));
         if self.modal.diameter {
             (i, j, k) = (i / 2.0, j / 2.0, k / 2.0);
         }
@@ -82,12 +76,11 @@ impl State {
             }
         }
         let degression = block.get(b'R').unwrap_or(1.0);
-        if degression < 1.0 {
+        if pkm && degression < 1.0 {
             return Err(block.word_error(b'R', ErrorKind::ThreadIjk { letter: 'R' }));
         }
-        let spindle = self.needs_turning_spindle(G76, block)?;
         let end = self.end_point(block)?;
-        if [1, 3, 4, 5, 6, 7, 8].iter().any(|axis| end[*axis] != self.position[*axis]) {
+        if (3..9).chain(pkm.then_some(1)).any(|axis| end[axis] != self.position[axis]) {
             return Err(block.motion_error(ErrorKind::ThreadAxes));
         }
         let taper_length = block.get(b'E').unwrap_or(0.0);
@@ -113,7 +106,7 @@ impl State {
         while depth < full {
             thread.pass(depth - i.abs(), self.modal.feed_override, out);
             pass += 1.0;
-            depth = i.abs() + j * maths::pow(pass, 1.0 / degression);
+            depth = i.abs() + j * maths::pow(pass, 1.0 / degression.max(1.0));
         }
         let spring = block.get(b'H').map_or(0, |h| h as i64).max(0);
         for _ in 0..=spring {

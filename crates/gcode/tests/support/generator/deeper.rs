@@ -105,8 +105,10 @@ impl Generator {
             _ => {
                 let (i, j, k) = (self.number(), self.small(5), self.small(9));
                 let (z, p) = (self.number(), 1 + self.small(3));
-                let _ = write!(self.text, "G90 G76 P{p} Z{z} I{i} J0.{j} K{k} ");
-                for (word, limit) in [("R1.", 10), ("Q", 40), ("H", 4), ("E", 5), ("L", 5)] {
+                let words = self.random.pick(&["", "", "", "Y2 ", "G17 ", "G19 "]);
+                let _ = write!(self.text, "G90 G76 P{p} Z{z} I{i} J0.{j} K{k} {words}");
+                let r = self.random.pick(&["R1.", "R1.", "R0."]);
+                for (word, limit) in [(r, 10), ("Q", 40), ("H", 4), ("E", 5), ("L", 5)] {
                     if self.random.chance(50) {
                         let value = self.small(limit);
                         let _ = write!(self.text, "{word}{value} ");
