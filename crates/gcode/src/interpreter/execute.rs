@@ -24,7 +24,11 @@ impl State {
         self.select_tool(block, out)?;
         let mut synch = self.input_output(block, out)?;
         synch |= self.change_tool(block, out)?;
-        self.spindle(block, out)?;
+        let replaced = self.spindle(block, out)?;
+        if replaced && self.settings.dialect != Dialect::Pkm {
+            // What M72 runs takes the block's place: the rest of it is lost (checked with rs274 2.9).
+            return Ok(if synch { Status::Synch } else { Status::Running });
+        }
         self.coolant(block, out);
         self.overrides(block, out)?;
         synch |= self.user_code(block, out)?;

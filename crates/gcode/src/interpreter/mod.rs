@@ -85,6 +85,11 @@ impl Out<'_> {
         self.emit(Canon::Comment(text.into()));
     }
 
+    /// A line that the interpreter has written itself is interpreted.
+    pub(crate) fn line_read(&mut self, text: &[u8]) {
+        self.sink.line_read(text, self.span);
+    }
+
     /// Everything that waits goes out.
     pub(crate) fn flush(&mut self) {
         self.queue.flush(self.sink);

@@ -100,8 +100,8 @@ impl State {
         }
     }
 
-    /// M3, M4, M5, M19.
-    pub(crate) fn spindle(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
+    /// M3, M4, M5, M19, M70 to M73. True if M72 has run other blocks.
+    pub(crate) fn spindle(&mut self, block: &Block, out: &mut Out<'_>) -> Result<bool, Error> {
         match block.m(MGroup::Spindle) {
             Some(number @ (3 | 4)) => {
                 let direction = if number == 3 { Direction::Clockwise } else { Direction::Counterclockwise };
@@ -118,10 +118,10 @@ impl State {
                 }
             }
             Some(19) => self.orient(block, out)?,
-            Some(number) => self.save_or_restore(number, block, out)?,
+            Some(number) => return self.save_or_restore(number, block, out),
             None => {}
         }
-        Ok(())
+        Ok(false)
     }
 
     /// M19 R P Q: orient to R degrees, P 0 shortest way 1 clockwise 2 counter-clockwise, wait at most Q seconds.

@@ -34,7 +34,15 @@ impl State {
             return Ok(());
         }
         self.parameters.set(parameters::SYSTEM, system.into());
-        self.keep_machine_point(|state| state.load_system(system));
+        let g92 = self.g92;
+        self.keep_machine_point(|state| {
+            state.load_system(system);
+            // The new position is read with G92 as LinuxCNC keeps it (checked with rs274 2.9).
+            if state.settings.dialect != Dialect::Pkm {
+                state.g92 = state.kept_g92();
+            }
+        });
+        self.g92 = g92;
         out.emit(self.g5x_command());
         out.emit(self.g92_command());
         out.emit(Canon::SetXyRotation(self.rotation_deg));
@@ -205,7 +213,7 @@ impl State {
         Ok(())
     }
 
-    /// G52 and G92 as the parameters have them: LinuxCNC's G10 looks there, also where a program has changed them since
+    /// G52 and G92 as the parameters have them: LinuxCNC looks there in G10 and G54 to G59.3, also where a program has changed them since
     /// (checked with rs274 2.9).
     pub(crate) fn kept_g92(&self) -> [f64; 9] {
         match self.parameters.get(parameters::G92_APPLIED) {

@@ -9,6 +9,7 @@ use crate::modal::*;
 use crate::parameters;
 use crate::settings::Dialect;
 use core::fmt::Write;
+use heapless::Vec;
 use pkm_canon::{Direction, LengthUnit, MotionControlMode, Plane, Span};
 
 /// Deepest call level: the main program and nine calls.
@@ -38,13 +39,13 @@ impl State {
         self.saved.levels.get_mut(self.call_level as usize)
     }
 
-    /// M70, M71, M72, M73.
+    /// M70, M71, M72, M73. True if other blocks have run.
     pub(crate) fn save_or_restore(
         &mut self,
         number: i32,
         block: &Block,
         out: &mut Out<'_>,
-    ) -> Result<(), Error> {
+    ) -> Result<bool, Error> {
         let none = Err(block.m_error(MGroup::Spindle, ErrorKind::StateNone));
         match number {
             70 | 73 => {
@@ -57,13 +58,13 @@ impl State {
                 if let Some(place) = self.saved_here() {
                     *place = Some(saved);
                 }
-                Ok(())
+                Ok(false)
             }
             71 => {
                 if let Some(place) = self.saved_here() {
                     *place = None;
                 }
-                Ok(())
+                Ok(false)
             }
             _ => match self.saved_here().and_then(|place| place.clone()) {
                 Some(saved) => self.restore(&saved, block.m_span(MGroup::Spindle), out),
@@ -78,22 +79,36 @@ impl State {
         self.saved_here().and_then(Option::take).filter(|saved| saved.on_return)
     }
 
-    /// Runs the blocks that bring the state back.
-    pub(crate) fn restore(&mut self, saved: &Saved, span: Span, out: &mut Out<'_>) -> Result<(), Error> {
+    /// Runs the blocks that bring the state back. True if there were any.
+    pub(crate) fn restore(&mut self, saved: &Saved, span: Span, out: &mut Out<'_>) -> Result<bool, Error> {
+        let mut ran = false;
         if saved.modal.units != self.modal.units {
             let units = if saved.modal.units == LengthUnit::Inch { "G20" } else { "G21" };
-            self.run_text(units, span, out)?;
+            ran |= self.run_text(units, span, out)?;
         }
-        // The M codes first (checked with rs274 2.9).
-        for text in self.m_codes_to(&saved.modal).iter().filter(|text| !text.is_empty()) {
-            self.run_text(text, span, out)?;
+        let m_codes = self.m_codes_to(&saved.modal);
+        let mut m_codes = m_codes.iter();
+        let mut text = self.g_codes_to(saved);
+        // In LinuxCNC the first M code stands in the block of the G codes (checked with rs274 2.9).
+        if self.settings.dialect != Dialect::Pkm {
+            let _ = text.push_str(m_codes.next().unwrap_or(&""));
         }
-        let text = self.g_codes_to(saved);
-        self.run_text(&text, span, out)
+        ran |= self.run_text(&text, span, out)?;
+        for text in m_codes {
+            ran |= self.run_text(text, span, out)?;
+        }
+        Ok(ran)
     }
 
-    /// Interprets a line that is not in the source; errors point at `span`.
-    fn run_text(&mut self, text: &str, span: Span, out: &mut Out<'_>) -> Result<(), Error> {
+    /// Interprets a line that is not in the source; errors point at `span`. False for an empty one.
+    fn run_text(&mut self, text: &str, span: Span, out: &mut Out<'_>) -> Result<bool, Error> {
+        if text.is_empty() {
+            return Ok(false);
+        }
+        if self.settings.dialect != Dialect::Pkm {
+            // What follows bears no N (checked with rs274 2.9).
+            out.line_read(text.as_bytes());
+        }
         let at = |error: Error| Error { span, ..error };
         let mut line = Line::new();
         line.load(text.as_bytes(), span.file, span.line).map_err(at)?;
@@ -101,7 +116,7 @@ impl State {
         let mut block = Block::new();
         block.read(&line, 0, self, &self.reader()).map_err(at)?;
         self.complete(&mut block).map_err(at)?;
-        self.execute(&mut block, &line, out).map_err(at).map(|_| ())
+        self.execute(&mut block, &line, out).map_err(at).map(|_| true)
     }
 
     /// The block of G codes, F and S.
@@ -183,40 +198,41 @@ impl State {
         text
     }
 
-    /// The M codes, one block each.
-    fn m_codes_to(&self, then: &Modal) -> [&'static str; 6] {
-        let now = &self.modal;
-        let mut texts = [""; 6];
-        if then.spindles[0].turning != now.spindles[0].turning {
-            texts[0] = match then.spindles[0].turning {
+    /// The M codes. LinuxCNC misses some of the way back (checked with rs274 2.9): one kind of coolant that is too much,
+    /// M51, M52 and M53 P0.
+    fn m_codes_to(&self, then: &Modal) -> Vec<&'static str, 8> {
+        let (now, pkm) = (&self.modal, self.settings.dialect == Dialect::Pkm);
+        let mut texts = Vec::new();
+        // There is room for every code at once; a push cannot fail.
+        let mut add = |needed: bool, text| {
+            if needed {
+                let _ = texts.push(text);
+            }
+        };
+        let turning = then.spindles[0].turning;
+        add(
+            turning != now.spindles[0].turning,
+            match turning {
                 None => "M5",
                 Some(Direction::Clockwise) => "M3",
                 Some(Direction::Counterclockwise) => "M4",
-            };
-        }
-        if (then.mist, then.flood) != (now.mist, now.flood) {
-            (texts[1], texts[2]) = match (then.mist, then.flood) {
-                (false, false) => ("M9", ""),
-                (true, false) => ("M7", ""),
-                (false, true) => ("M8", ""),
-                (true, true) => ("M7", "M8"),
-            };
-        }
-        let overrides = |modal: &Modal| (modal.feed_override, modal.spindles[0].speed_override);
-        if overrides(then) != overrides(now) {
-            texts[3] = match overrides(then) {
-                (true, true) => "M48",
-                (false, false) => "M49",
-                (true, false) => "M50 P1",
-                (false, true) => "M50 P0",
-            };
-        }
-        // LinuxCNC forgets M52.
-        if then.adaptive_feed != now.adaptive_feed && self.settings.dialect == Dialect::Pkm {
-            texts[4] = if then.adaptive_feed { "M52 P1" } else { "M52 P0" };
-        }
-        if then.feed_hold != now.feed_hold {
-            texts[5] = if then.feed_hold { "M53 P1" } else { "M53 P0" };
+            },
+        );
+        let too_much = (now.mist && !then.mist) || (now.flood && !then.flood);
+        let off = too_much && (pkm || !(then.mist || then.flood));
+        add(off, "M9");
+        add(then.mist && (off || !now.mist), "M7");
+        add(then.flood && (off || !now.flood), "M8");
+        if pkm {
+            let [feed, speed] = [then.feed_override, then.spindles[0].speed_override];
+            add(feed != now.feed_override, if feed { "M50 P1" } else { "M50 P0" });
+            add(speed != now.spindles[0].speed_override, if speed { "M51 P1" } else { "M51 P0" });
+            let [adaptive, hold] = [then.adaptive_feed, then.feed_hold];
+            add(adaptive != now.adaptive_feed, if adaptive { "M52 P1" } else { "M52 P0" });
+            add(hold != now.feed_hold, if hold { "M53 P1" } else { "M53 P0" });
+        } else {
+            add(then.feed_override != now.feed_override, if then.feed_override { "M48" } else { "M51" });
+            add(then.feed_hold && !now.feed_hold, "M53");
         }
         texts
     }
