@@ -245,9 +245,10 @@ errors! {
     ProbeCc "probe-cc" "probing while cutter compensation is on" "switch it off with G40 first";
     ProbeShort { code: Code } "probe-short" "G{code} to where the tool stands" "give it a distance to search";
     // Tools and offsets.
-    ToolUnknown { number: i32 } "tool-unknown" "tool {number} is not in the tool table" "add it to the tool table";
+    ToolUnknown { number: i32 } "tool-unknown" "tool {number} is not in the tool table" "add it to the tool table; with a random tool changer tool 0 too";
     ToolNotSelected "tool-missing" "M6, but no tool was selected" "select it with T first; T0 for none";
     ToolTableFull { limit: u16 } "tool-table-full" "more than {limit} tools" "remove some";
+    ToolPocket { number: i32, pocket: i32 } "tool-pocket" "tool {number} in pocket {pocket}" "with a random tool changer each tool needs a pocket (P, 0 = the spindle) of its own";
     OffsetP { value: f64, first: i32, last: i32 } "offset-p" "G10 P{value}: P is a whole number from {first} to {last}" "name a coordinate system or a tool";
     OffsetL { value: f64 } "offset-l" "G10 L{value}" "L is 0, 1, 2, 10, 11 or 20";
     OffsetLMissing "offset-l" "G10 without L" "L is 0, 1, 2, 10, 11 or 20";

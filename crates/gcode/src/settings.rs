@@ -59,6 +59,9 @@ pub struct Settings {
     pub wrapped_rotary: [bool; 3],
     /// A, B, C are locked while the machine cuts: each moves alone, and only by G0.
     pub locking_indexer: [bool; 3],
+    /// Each tool has a pocket of its own, and M6 exchanges it with the one in the spindle: slots are pockets, and tool 0 is a tool like any
+    /// other.
+    pub random_toolchanger: bool,
     /// M6 first moves Z to machine zero.
     pub tool_change_quill_up: bool,
     /// M6 first moves to the G30 position.
@@ -109,6 +112,7 @@ impl Default for Settings {
             machine_codes: MachineCodes::default(),
             wrapped_rotary: [false; 3],
             locking_indexer: [false; 3],
+            random_toolchanger: false,
             tool_change_quill_up: false,
             tool_change_at_g30: false,
             tool_change_with_spindle_on: false,
@@ -134,6 +138,11 @@ impl Settings {
     /// True where LinuxCNC 2.10 and pkm have something that 2.9 lacks.
     pub(crate) fn is_newer(&self) -> bool {
         self.dialect != Dialect::LinuxCnc29
+    }
+
+    /// True if M6 exchanges tools. Those of the machine that rs274 simulates stay where they are (checked with rs274 2.9).
+    pub(crate) fn exchanges_tools(&self) -> bool {
+        self.random_toolchanger && !(self.imitates_rs274 && self.dialect != Dialect::Pkm)
     }
 
     /// The machine that Debian's `rs274` simulates: an inch machine with the axes XYZABC, started in mm.

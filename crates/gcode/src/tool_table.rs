@@ -11,11 +11,24 @@ type Rows = heapless::Vec<Tool, 32>;
 /// Most tools a table holds (LinuxCNC: 1001 pockets, one of them the spindle).
 pub const MAX_TOOLS: usize = if cfg!(feature = "alloc") { 1000 } else { 32 };
 
-/// The tools of a machine; lengths in machine units. Slot 0 is the spindle, slots 1 and up the rows in file order.
-#[derive(Debug, Clone, Default)]
+/// The tools of a machine; lengths in machine units. Slot 0 is the spindle, slots 1 and up the rows in file order; or, when arranged by
+/// pocket, slots are pockets, each with its tool or with none (number -1), and slot 0 the spindle too.
+#[derive(Debug, Clone)]
 pub struct ToolTable {
     rows: Rows,
     spindle: Tool,
+    by_pocket: bool,
+}
+
+impl Default for ToolTable {
+    fn default() -> Self {
+        Self { rows: Rows::default(), spindle: no_tool(), by_pocket: false }
+    }
+}
+
+/// An empty spindle.
+fn no_tool() -> Tool {
+    Tool { pocket: -1, ..Tool::default() }
 }
 
 impl ToolTable {
@@ -37,6 +50,14 @@ impl ToolTable {
 
     /// The slot of a tool number: 0 for tool 0, else the first row that has it.
     pub fn slot(&self, number: i32) -> Option<i32> {
+        if self.by_pocket {
+            let found = || self.rows.iter().find(|tool| tool.number == number).map(|tool| tool.pocket);
+            return if number < 0 {
+                None
+            } else {
+                (self.spindle.number == number).then_some(0).or_else(found)
+            };
+        }
         if number == 0 {
             return Some(0);
         }
@@ -47,6 +68,7 @@ impl ToolTable {
     pub fn get(&self, slot: i32) -> Option<&Tool> {
         match usize::try_from(slot).ok()? {
             0 => Some(&self.spindle),
+            _ if self.by_pocket => self.rows.iter().find(|tool| tool.pocket == slot),
             i => self.rows.get(i - 1),
         }
     }
@@ -55,15 +77,43 @@ impl ToolTable {
     pub fn get_mut(&mut self, slot: i32) -> Option<&mut Tool> {
         match usize::try_from(slot).ok()? {
             0 => Some(&mut self.spindle),
+            _ if self.by_pocket => self.rows.iter_mut().find(|tool| tool.pocket == slot),
             i => self.rows.get_mut(i - 1),
         }
     }
 
-    /// Puts the tool of a slot into the spindle; slot 0 empties it.
+    /// For a random tool changer: slots are pockets; what stands in pocket 0 is in the spindle.
+    ///
+    /// # Errors
+    /// [`ErrorKind::ToolPocket`]: a tool without a pocket of its own.
+    pub fn arrange_by_pocket(&mut self) -> Result<(), ErrorKind> {
+        self.by_pocket = false;
+        for (i, tool) in self.rows.iter().enumerate() {
+            let taken = self.rows[..i].iter().any(|other| other.pocket == tool.pocket);
+            if tool.pocket < 0 || taken {
+                return Err(ErrorKind::ToolPocket { number: tool.number, pocket: tool.pocket });
+            }
+        }
+        self.spindle = match self.rows.iter().position(|tool| tool.pocket == 0) {
+            Some(row) => self.rows.remove(row),
+            None => Tool { number: -1, ..Tool::default() },
+        };
+        self.by_pocket = true;
+        Ok(())
+    }
+
+    /// Puts the tool of a slot into the spindle; slot 0 empties it. Arranged by pocket: exchanges it with the tool in the spindle.
     pub fn load_spindle(&mut self, slot: i32) {
+        if self.by_pocket {
+            if let Some(row) = self.rows.iter_mut().find(|tool| tool.pocket == slot && slot > 0) {
+                core::mem::swap(row, &mut self.spindle);
+                (row.pocket, self.spindle.pocket) = (slot, 0);
+            }
+            return;
+        }
         self.spindle = match slot {
-            0 => Tool::default(),
-            slot => self.get(slot).copied().unwrap_or_default(),
+            0 => no_tool(),
+            slot => self.get(slot).copied().unwrap_or_else(no_tool),
         };
     }
 

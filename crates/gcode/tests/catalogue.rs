@@ -302,6 +302,9 @@ fn every_row_of_the_catalogue_is_raised() {
         let (_, error) = ParameterFile::read(bytes, &mut Parameters::default()).expect_err("a damaged file");
         told.insert((error.code(), error.to_string()));
     }
+    let mut table = ToolTable::parse(b"T1 P2\nT2 P2\n", |_, _| {}).expect("a table");
+    let error = table.arrange_by_pocket().expect_err("a pocket for two");
+    told.insert((error.code(), error.to_string()));
     let tools: String = (0..1010).map(|n| format!("T{n} P{n}\n")).collect();
     let error = ToolTable::parse(tools.as_bytes(), |_, _| {}).expect_err("too many tools");
     told.insert((error.code(), error.to_string()));

@@ -67,3 +67,135 @@ fn configured_machines_agree_with_rs274() {
     }
     let _ = std::fs::remove_dir_all(&directory);
 }
+
+/// Rows in another order than their pockets, a tool 0 and a gap.
+const POCKETS: &str = "T1 P3 D0.125 Z+0.511\nT2 P1 D0.0625 Z+0.1\nT3 P5 D0.201 X+0.3 Z+1.273\nT0 P7\nT4 P2 D0.25 Z0.7 I20 J-20 Q2\n";
+
+const SEEN: &str = "(print,#5400 #5401 #5403 #5410 #<_current_tool> #<_current_pocket> #<_selected_tool> #<_selected_pocket>)\n";
+
+/// What programs may do with tools; what they see of them is printed after every block.
+const TOOL_BLOCKS: [&str; 24] = [
+    "T1",
+    "T2",
+    "T3",
+    "T4",
+    "T0",
+    "M6",
+    "M6",
+    "M6",
+    "G43",
+    "G43 H1",
+    "G43 H3",
+    "G43 H0",
+    "G49",
+    "M61 Q2",
+    "M61 Q4",
+    "M61 Q0",
+    "G10 L1 P1 Z3",
+    "G10 L1 P2 R4 X1",
+    "G10 L10 P3 Z3",
+    "G10 L11 P4 Z2",
+    "G10 L0",
+    "T3 M6 G43",
+    "M5 T2 M6",
+    "G0 X1 Z2",
+];
+
+/// Seeded programs on changers with and without pockets of their own.
+#[test]
+fn tool_changers_agree_with_rs274() {
+    if !has_rs274() {
+        eprintln!("skipped: rs274 is not installed");
+        return;
+    }
+    let directory = std::env::temp_dir().join(format!("pkm-tools-{}", std::process::id()));
+    std::fs::create_dir_all(&directory).expect("a scratch directory");
+    let count: u64 = std::env::var("PKM_ORACLE_COUNT").ok().and_then(|n| n.parse().ok()).unwrap_or(20);
+    let (mut failures, mut compared) = (Vec::new(), 0);
+    for random in [false, true] {
+        let ini = format!("[EMCIO]\nRANDOM_TOOLCHANGER = {}\n", i32::from(random));
+        for seed in 1..=count {
+            let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let mut text = SEEN.to_owned();
+            for _ in 0..12 {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                let block = TOOL_BLOCKS[(state >> 33) as usize % TOOL_BLOCKS.len()];
+                text += &format!("{block}\n{SEEN}");
+            }
+            text += "M2\n";
+            let oracle = support::rs274_tools(text.as_bytes(), &directory, &ini, POCKETS);
+            let Some(oracle) = oracle else { continue };
+            compared += 1;
+            let settings = Settings { random_toolchanger: random, ..Settings::rs274() };
+            let ours = support::pkm_tools(settings, text.as_bytes(), POCKETS);
+            if let Some(difference) = difference(&oracle, &ours) {
+                failures.push(format!("random {random}, seed {seed}: {difference}\n{text}"));
+            }
+        }
+    }
+    let _ = std::fs::remove_dir_all(&directory);
+    eprintln!("{compared} programs compared, {} differ", failures.len());
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// The machine that rs274 simulates exchanges nothing; a real one does.
+#[test]
+fn a_random_tool_changer_exchanges_tools() {
+    let settings = Settings { random_toolchanger: true, ..Settings::default() };
+    let run = |text: &str, table: &str| support::pkm_tools(settings, text.as_bytes(), table);
+    let table = "T1 P3 Z1\nT2 P1 Z2\nT9 P0 Z9\nT0 P7\n";
+    let outcome = run(
+        &format!(
+            "{SEEN}G43\nT1\n{SEEN}M6 G43\n{SEEN}M6\nT9 M6\n{SEEN}G43 H1\nT0 M6\n{SEEN}M61 Q2\n{SEEN}G10 L1 P2 Z5\nG10 L1 P0 Z1\n"
+        ),
+        table,
+    );
+    let said: Vec<&str> = outcome.lines.iter().map(|line| line.get(13..).unwrap_or(line)).collect();
+    // #5400 #5401 #5403 #5410, current tool and pocket, selected tool and pocket
+    let row = |tool: i32, z: i32, selected: i32, pocket: i32| -> String {
+        let numbers = [tool, 0, z, 0, tool, 0, selected, pocket];
+        numbers.map(|n| format!("{n}.000000")).join(" ")
+    };
+    let rows: Vec<&str> = outcome
+        .lines
+        .iter()
+        .map(String::as_str)
+        .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
+        .collect();
+    // T1 comes from pocket 3, and T9 goes there; T0 takes T9's place, and so on.
+    let expected = [
+        row(9, 9, 0, 0),
+        row(9, 9, 1, 3),
+        row(1, 1, 1, 0),
+        row(9, 9, 9, 0),
+        row(0, 0, 0, 0),
+        row(2, 2, 0, 0),
+    ];
+    assert_eq!(rows, expected);
+    let changes: Vec<&str> = said
+        .iter()
+        .copied()
+        .filter(|line| line.starts_with("CHANGE_TOOL") || line.starts_with("SET_TOOL"))
+        .collect();
+    // T1 from 3; M6 again: none; T9 from 3; T0 from 7; M61: T2 from 1, T0 goes there.
+    assert_eq!(
+        changes[..5],
+        ["CHANGE_TOOL(3)", "CHANGE_TOOL(0)", "CHANGE_TOOL(3)", "CHANGE_TOOL(7)", "CHANGE_TOOL_NUMBER(1)"]
+    );
+    assert!(changes[5].starts_with("SET_TOOL_TABLE_ENTRY(0, 2, "), "in the spindle: {changes:?}");
+    assert_eq!(changes.len(), 6);
+    assert!(outcome.message.starts_with("[offset-p]"), "{}", outcome.message);
+    for (program, table, code) in [
+        ("T0\nM2\n", "T1 P1\n", "[tool-unknown]"),
+        ("T1\nM2\n", "T1 P1\nT2 P1\n", "[tool-pocket]"),
+        ("T1\nM2\n", "T1\n", "[tool-pocket]"),
+    ] {
+        let outcome = run(program, table);
+        assert!(outcome.message.starts_with(code), "{program}{table}{}", outcome.message);
+    }
+    // Without a tool in pocket 0 the spindle is empty, which is not tool 0.
+    assert_eq!(
+        run("(print,#5400)\nM2\n", "T0 P1\n").lines.iter().filter(|line| *line == "-1.000000").count(),
+        1
+    );
+}

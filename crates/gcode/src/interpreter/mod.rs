@@ -295,6 +295,17 @@ impl Interpreter {
         out.emit(Canon::SetFeedReference);
     }
 
+    /// Before the first block a random tool changer gets its tools in order.
+    fn prepare_tools(&mut self) -> Result<(), Error> {
+        if self.phase != Phase::New || !self.state.settings.random_toolchanger {
+            return Ok(());
+        }
+        self.state.prepare_random_changer().map_err(|kind| {
+            self.phase = Phase::Ended;
+            Error { kind, span: Span::default() }
+        })
+    }
+
     /// Reads and executes one block.
     ///
     /// # Errors
@@ -302,6 +313,7 @@ impl Interpreter {
     /// execution have been emitted. The next step goes on with the next block; what would only repeat or follow from
     /// an error that was returned is not returned again (with the feature `alloc`).
     pub fn step(&mut self, source: &mut dyn LineSource, sink: &mut dyn CanonSink) -> Result<Status, Error> {
+        self.prepare_tools()?;
         self.start(sink);
         #[cfg(feature = "alloc")]
         self.go_on(source, sink);

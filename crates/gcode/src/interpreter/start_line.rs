@@ -75,6 +75,7 @@ impl Interpreter {
         if self.state.splines.is_open() {
             return fail(ErrorKind::StartSpline { line });
         }
+        self.prepare_tools()?;
         self.start(sink);
         if self.phase != Phase::Opening {
             self.command_state(span, sink);
@@ -114,7 +115,11 @@ impl Interpreter {
         out.emit(state.g5x_command());
         out.emit(state.g92_command());
         out.emit(Canon::SetXyRotation(state.rotation_deg));
-        if let Some(tool) = state.tools.get(0).filter(|_| state.loaded_slot > 0) {
+        if let Some(tool) = state
+            .tools
+            .get(0)
+            .filter(|tool| state.loaded_slot > 0 || state.settings.exchanges_tools() && tool.number > 0)
+        {
             out.emit(Canon::ChangeToolNumber { slot: state.loaded_slot, tool: tool.number });
         }
         if modal.selected_slot >= 0 {

@@ -41,6 +41,8 @@ pub(crate) struct State {
     pub(crate) saved: SavedStates,
     /// Slot of the tool in the spindle; 0 = none.
     pub(crate) loaded_slot: i32,
+    /// The spindle's pocket before G10 wrote a row there; only rs274 shows it again.
+    pub(crate) spindle_pocket: Option<i32>,
     /// Open calls.
     pub(crate) call_level: u32,
     /// What the last return gave; `None` = nothing.
@@ -75,6 +77,7 @@ impl State {
             saved: SavedStates::default(),
             // rs274 begins with slot 1 in force and an empty spindle.
             loaded_slot: i32::from(settings.imitates_rs274),
+            spindle_pocket: None,
             call_level: 0,
             return_value: None,
             unknown_names_are_zero: false,
@@ -280,9 +283,9 @@ impl State {
             b"_feed" => Some(modal.feed),
             b"_rpm" => Some(spindle.speed.abs()),
             b"_current_tool" => self.tools.get(0).map(|tool| tool.number.into()),
-            b"_current_pocket" => Some(self.loaded_slot.into()),
+            b"_current_pocket" => Some(self.pocket_of(self.loaded_slot)),
             b"_selected_tool" => Some(modal.selected_tool.into()),
-            b"_selected_pocket" => Some(modal.selected_slot.into()),
+            b"_selected_pocket" => Some(self.pocket_of(modal.selected_slot)),
             b"_task" | b"_remap_level" => Some(0.0),
             b"_call_level" => Some(self.call_level.into()),
             b"_value" => Some(self.return_value.unwrap_or(0.0)),

@@ -47,15 +47,15 @@ impl State {
                 self.move_to_tool_change(out);
                 let (slot, tool) = (self.modal.selected_slot.max(0), self.modal.selected_tool);
                 out.emit(Canon::ChangeTool { slot, tool });
-                // rs274 copies the slot to slot 0: with T0 the tool stays (checked with rs274 2.9).
-                if !(slot == 0 && self.settings.imitates_rs274) {
-                    self.tools.load_spindle(slot);
-                }
-                self.loaded_slot = slot;
+                self.take_tool(slot);
                 if self.settings.retain_g43 && self.modal.follows_tool {
-                    let tool = self.tools.get(slot).copied().filter(|_| slot > 0).unwrap_or_default();
-                    let offset = self.program_units(tool.offset.to_array());
-                    self.modal.follows_tool = slot > 0;
+                    let loaded = match self.settings.exchanges_tools() {
+                        true => self.tools.get(0).filter(|tool| tool.number > 0),
+                        false => self.tools.get(slot).filter(|_| slot > 0),
+                    };
+                    self.modal.follows_tool = loaded.is_some();
+                    let offset = loaded.copied().unwrap_or_default().offset;
+                    let offset = self.program_units(offset.to_array());
                     self.keep_machine_point(|state| state.tool_offset = offset);
                     out.emit(Canon::UseToolLengthOffset(Position::from_array(offset)));
                 }
@@ -76,9 +76,12 @@ impl State {
                     return Err(block.word_error(b'Q', ErrorKind::ToolUnknown { number: tool }));
                 };
                 out.emit(Canon::ChangeToolNumber { slot, tool });
-                self.loaded_slot = slot;
-                if !self.settings.imitates_rs274 {
-                    self.tools.load_spindle(slot);
+                // rs274's stays as it was (checked with rs274 2.9).
+                if self.settings.imitates_rs274 && !self.settings.exchanges_tools() {
+                    self.spindle_is_read_back();
+                    self.loaded_slot = slot;
+                } else {
+                    self.take_tool(slot);
                 }
                 Ok(true)
             }
@@ -86,9 +89,70 @@ impl State {
         }
     }
 
+    /// The tool of a slot goes into the spindle; a random tool changer puts the one that was there into its pocket.
+    fn take_tool(&mut self, slot: i32) {
+        if self.settings.exchanges_tools() {
+            self.tools.load_spindle(slot);
+            self.loaded_slot = 0;
+            // It is there now: another M6 changes nothing.
+            self.modal.selected_slot = 0;
+            return;
+        }
+        self.spindle_is_read_back();
+        // rs274 copies the slot to slot 0: with T0 the tool stays (checked with rs274 2.9).
+        if !(slot == 0 && self.settings.imitates_rs274) {
+            self.tools.load_spindle(slot);
+        }
+        self.loaded_slot = slot;
+    }
+
+    /// The machine that rs274 simulates kept the pocket of its spindle when G10 wrote a row there (checked with rs274 2.9).
+    fn spindle_is_read_back(&mut self) {
+        if let Some(pocket) = self.spindle_pocket.take()
+            && let Some(spindle) = self.tools.get_mut(0)
+        {
+            spindle.pocket = pocket;
+        }
+    }
+
+    /// What a random tool changer needs before the first block.
+    pub(crate) fn prepare_random_changer(&mut self) -> Result<(), ErrorKind> {
+        if self.settings.exchanges_tools() {
+            self.loaded_slot = 0;
+            return self.tools.arrange_by_pocket();
+        }
+        // rs274 begins without a tool, not even tool 0 (checked with rs274 2.9).
+        if let Some(spindle) = self.tools.get_mut(0) {
+            spindle.number = -1;
+        }
+        Ok(())
+    }
+
+    /// The pocket of a slot as the program sees it.
+    pub(crate) fn pocket_of(&self, slot: i32) -> f64 {
+        let slot = if self.settings.imitates_rs274 { slot.max(0) } else { slot };
+        let pocket = match self.tools.get(slot) {
+            _ if self.settings.random_toolchanger => slot.max(0),
+            _ if slot < 0 => -1,
+            // rs274's spindle is a row with a pocket, which its tool came from, or -1 (checked with rs274 2.9).
+            _ if slot == 0 && !self.settings.imitates_rs274 => 0,
+            Some(tool) => tool.pocket,
+            None => slot,
+        };
+        pocket.into()
+    }
+
     /// The tool of a number word; 0 is the tool in the spindle.
     pub(crate) fn tool_of(&self, block: &Block, letter: u8, number: i32) -> Result<Tool, Error> {
-        let slot = self.tools.slot(number);
+        let slot = match self.tools.slot(number) {
+            // With a random tool changer rs274 takes H0 for the slot it has loaded (checked with rs274 2.9).
+            Some(0)
+                if letter == b'H' && self.settings.random_toolchanger && !self.settings.exchanges_tools() =>
+            {
+                Some(self.loaded_slot)
+            }
+            slot => slot,
+        };
         slot.and_then(|slot| self.tools.get(slot))
             .copied()
             .ok_or_else(|| block.word_error(letter, ErrorKind::ToolUnknown { number }))
@@ -170,6 +234,7 @@ impl State {
             if self.tools.get(0).is_some_and(|tool| tool.number > 0) {
                 return Err(block.g_error(GGroup::NonModal, ErrorKind::ToolLoaded));
             }
+            self.spindle_is_read_back();
             out.emit(Canon::ReloadTooldata);
             return Ok(());
         }
@@ -195,7 +260,9 @@ impl State {
             *row = tool;
         }
         out.emit(Canon::SetToolTableEntry { slot, tool: &tool });
-        if slot == self.loaded_slot {
+        if slot == self.loaded_slot && !self.settings.random_toolchanger {
+            let pocket = self.tools.get(0).map(|spindle| spindle.pocket);
+            self.spindle_pocket = self.spindle_pocket.or(pocket);
             self.tools.load_spindle(slot);
             out.emit(Canon::SetToolTableEntry { slot: 0, tool: &tool });
         }

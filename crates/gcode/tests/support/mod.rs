@@ -104,6 +104,21 @@ pub fn rs274(program: &[u8], directory: &Path, variables: Option<&str>) -> Optio
     rs274_with(program, directory, variables, None)
 }
 
+/// The program as pkm interprets it, with a tool table and other settings.
+pub fn pkm_tools(settings: Settings, program: &[u8], tools: &str) -> Outcome {
+    interpret(settings, &mut MemorySource::new(program), tools.as_bytes(), None)
+}
+
+/// [`rs274`] with an INI file and a tool table.
+pub fn rs274_tools(program: &[u8], directory: &Path, ini: &str, tools: &str) -> Option<Outcome> {
+    let [file, table, settings] = ["program.ngc", "tool.tbl", "machine.ini"].map(|name| directory.join(name));
+    write(&file, program);
+    write(&table, tools.as_bytes());
+    write(&settings, ini.as_bytes());
+    let run = Rs274 { program: &file, tools: &table, beside: directory, scratch: directory };
+    run.outcome(None, &[OsStr::new("-i"), settings.as_os_str()])
+}
+
 /// [`rs274`] with an INI file.
 pub fn rs274_with(
     program: &[u8],

@@ -63,9 +63,7 @@ impl Ini {
         if self.entries.get(NGC, "REMAP").is_some() {
             return Err(self.refuse(NGC, "REMAP", "take it out: pkm has no remapped codes"));
         }
-        if self.flag("EMCIO", "RANDOM_TOOLCHANGER")? {
-            return Err(self.refuse("EMCIO", "RANDOM_TOOLCHANGER", "set it to 0: pkm does not have it"));
-        }
+        settings.random_toolchanger = self.flag("EMCIO", "RANDOM_TOOLCHANGER")?;
         for (axis, section) in ["AXIS_A", "AXIS_B", "AXIS_C"].into_iter().enumerate() {
             settings.wrapped_rotary[axis] = self.flag(section, "WRAPPED_ROTARY")?;
             settings.locking_indexer[axis] =
@@ -154,7 +152,6 @@ mod tests {
             ("[TRAJ]\nSPINDLES = 9\n", "[TRAJ]SPINDLES = 9"),
             ("[RS274NGC]\n\nORIENT_OFFSET = ten\n", "[RS274NGC]ORIENT_OFFSET = ten"),
             ("[EMCIO]\nTOOL_CHANGE_AT_G30 = perhaps\n", "[EMCIO]TOOL_CHANGE_AT_G30"),
-            ("[EMCIO]\nRANDOM_TOOLCHANGER = 1\n", "[EMCIO]RANDOM_TOOLCHANGER"),
             ("[RS274NGC]\nREMAP = M6 ngc=change\n", "[RS274NGC]REMAP"),
         ] {
             let Err(Failure::CouldNot(diagnostics)) = ini(text).apply(&mut Settings::rs274()) else {
