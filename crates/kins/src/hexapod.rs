@@ -398,12 +398,14 @@ impl Kinematics for Hexapod {
         Ok(jacobian)
     }
 
-    /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈. Two struts at a time, each with the operations of `struts` in their order.
+    /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈, with d̈ = p̈ + ([α]× + [ω]×²) R a. Two struts at a time, the lengths with the operations of
+    /// `struts` in their order.
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
         Self::finite(pose)?;
         let at = Attitude::of(pose);
         let (v, a) = (velocity, acceleration);
         let (omega, alpha) = at.spin(v, a);
+        let bend = bend(omega, alpha);
         let mut motion = JointMotion::default();
         let platform = self.platform.as_chunks().0.iter();
         let lengths = motion.position.as_chunks_mut().0.iter_mut();
@@ -414,17 +416,13 @@ impl Kinematics for Hexapod {
             let (arm, d) = pair::strut(&at, pose, points, bases);
             *length = sqrt_2(pair::dot(d, d));
             positive(*length, joints)?;
-            let unit = pair::scale([1.0 / length[0], 1.0 / length[1]], d);
-            let turn = pair::cross(pair::both(omega), arm);
-            let d_v = pair::add(pair::both([v.x, v.y, v.z]), turn);
-            let bend = pair::add(pair::cross(pair::both(alpha), arm), pair::cross(pair::both(omega), turn));
-            let d_a = pair::add(pair::both([a.x, a.y, a.z]), bend);
-            *rate = pair::dot(unit, d_v);
-            let (along, square) = (pair::dot(unit, d_a), pair::dot(d_v, d_v));
-            let one =
-                |along: f64, square: f64, rate: f64, length: f64| along + (square - rate * rate) / length;
-            let ([a0, a1], [s0, s1], [r0, r1], [l0, l1]) = (along, square, *rate, *length);
-            *second = [one(a0, s0, r0, l0), one(a1, s1, r1, l1)];
+            let part = length.map(|length| 1.0 / length);
+            let d_v = pair::add(pair::both([v.x, v.y, v.z]), pair::cross(pair::both(omega), arm));
+            let d_a = pair::add(pair::both([a.x, a.y, a.z]), bend.map(|row| pair::dot(pair::both(row), arm)));
+            let (along, square) = (pair::dot(d, d_a), pair::dot(d_v, d_v));
+            *rate = pair::times(pair::dot(d, d_v), part);
+            let rest = pair::minus(square, pair::times(*rate, *rate));
+            *second = pair::times(pair::plus(along, rest), part);
         }
         if v.is_finite() && a.is_finite() { Ok(motion) } else { Err(InverseError::NotFinite) }
     }
@@ -443,6 +441,13 @@ impl Kinematics for Hexapod {
         let forward = reciprocal_condition(&self.scaled_rows(&struts));
         Ok(Singularity { inverse: 1.0, inverse_joint: 0, forward })
     }
+}
+
+/// The rows of [α]× + [ω]×² = [α]× + ω ωᵀ − |ω|² 1: what turns an arm into its acceleration.
+fn bend([x, y, z]: Vec3, [ax, ay, az]: Vec3) -> [Vec3; 3] {
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    let (xy, xz, yz) = (x * y, x * z, y * z);
+    [[-yy - zz, xy - az, xz + ay], [xy + az, -xx - zz, yz - ax], [xz - ay, yz + ax, -xx - yy]]
 }
 
 /// Two struts with a length.
@@ -473,17 +478,17 @@ mod pair {
     }
 
     #[inline]
-    fn plus(a: Two, b: Two) -> Two {
+    pub(super) fn plus(a: Two, b: Two) -> Two {
         map(a, b, |a, b| a + b)
     }
 
     #[inline]
-    fn minus(a: Two, b: Two) -> Two {
+    pub(super) fn minus(a: Two, b: Two) -> Two {
         map(a, b, |a, b| a - b)
     }
 
     #[inline]
-    fn times(a: Two, b: Two) -> Two {
+    pub(super) fn times(a: Two, b: Two) -> Two {
         map(a, b, |a, b| a * b)
     }
 
@@ -506,11 +511,6 @@ mod pair {
     #[inline]
     pub(super) fn sub(u: Pair, v: Pair) -> Pair {
         [minus(u[0], v[0]), minus(u[1], v[1]), minus(u[2], v[2])]
-    }
-
-    #[inline]
-    pub(super) fn scale(k: Two, v: Pair) -> Pair {
-        [times(k, v[0]), times(k, v[1]), times(k, v[2])]
     }
 
     #[inline]
@@ -553,12 +553,13 @@ mod tests {
         let mut motion = JointMotion::default();
         for (i, strut) in struts.iter().enumerate() {
             motion.position[i] = strut.length;
-            let turn = cross(omega, strut.arm);
-            let d_v = add([v.x, v.y, v.z], turn);
-            let d_a = add([a.x, a.y, a.z], add(cross(alpha, strut.arm), cross(omega, turn)));
-            let rate = dot(strut.unit, d_v);
+            let d = sub(add([pose.x, pose.y, pose.z], strut.arm), hexapod.base[i]);
+            let d_v = add([v.x, v.y, v.z], cross(omega, strut.arm));
+            let d_a = add([a.x, a.y, a.z], bend(omega, alpha).map(|row| dot(row, strut.arm)));
+            let part = 1.0 / strut.length;
+            let rate = dot(d, d_v) * part;
             motion.velocity[i] = rate;
-            motion.acceleration[i] = dot(strut.unit, d_a) + (dot(d_v, d_v) - rate * rate) / strut.length;
+            motion.acceleration[i] = (dot(d, d_a) + (dot(d_v, d_v) - rate * rate)) * part;
         }
         motion
     }

@@ -136,12 +136,12 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         } else if rests && !self.executor.dwells && self.waits_for_step() {
             state = State::BlockEnd;
         }
-        let setpoint = self.publish(state);
+        let published = self.publish(state);
         if over {
             // Only now: the last of the way is in this setpoint.
             self.clear();
         }
-        setpoint
+        published.map(|()| self.setpoint)
     }
 
     /// A dwell takes whole servo periods; the last one may be cut short.
@@ -396,16 +396,16 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.is_brief(node.length, x_end).then_some(x_end)
     }
 
-    fn publish(&mut self, state: State) -> Result<Setpoint, PlanError> {
+    fn publish(&mut self, state: State) -> Result<(), PlanError> {
         let at_rest = self.executor.at_rest();
         self.setpoint.state = state;
         self.setpoint.starved = self.starved;
         let Some(node) = self.nodes.front() else {
             self.setpoint.joint_velocity = Default::default();
-            return Ok(self.setpoint);
+            return Ok(());
         };
         let (piece, s) = (node.piece, node.s + self.executor.sigma);
-        let Some((point, piece)) = self.pose_at(piece, s) else { return Ok(self.setpoint) };
+        let Some((point, piece)) = self.pose_at(piece, s) else { return Ok(()) };
         let speed = sqrt(self.executor.x);
         let pose = Pose::from_array(point.position);
         let velocity = Pose::from_array(point.first.map(|d| d * speed));
@@ -427,7 +427,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             state,
             starved: self.starved,
         };
-        Ok(self.setpoint)
+        Ok(())
     }
 }
 

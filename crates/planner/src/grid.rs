@@ -76,9 +76,9 @@ pub(crate) struct Grid<const R: usize> {
     pub(crate) piece: u64,
     pub(crate) s: f64,
     step: f64,
-    /// At the last node; at the place that may become the next.
-    last: Sample<R>,
-    next: Sample<R>,
+    /// At the last node, and at the place that may become the next; the first of them is that of the last node if `swapped` is false.
+    samples: [Sample<R>; 2],
+    swapped: bool,
     /// Nodes from the front on that the look-ahead has planned; the last of them as a stop.
     pub(crate) planned: usize,
     /// How many of them the last pass had to plan again.
@@ -119,8 +119,8 @@ impl<const R: usize> Grid<R> {
             piece: 0,
             s: 0.0,
             step: f64::INFINITY,
-            last: Sample::EMPTY,
-            next: Sample::EMPTY,
+            samples: [Sample::EMPTY; 2],
+            swapped: false,
             planned: 0,
             depth: 0,
             settled: f64::NEG_INFINITY,
@@ -129,6 +129,12 @@ impl<const R: usize> Grid<R> {
             before: Panel::NEUTRAL,
             pass: None,
         }
+    }
+
+    /// At the last node, and at the place that may become the next.
+    fn samples(&mut self) -> (&mut Sample<R>, &mut Sample<R>) {
+        let [a, b] = &mut self.samples;
+        if self.swapped { (b, a) } else { (a, b) }
     }
 
     /// True while the look-ahead has not finished what it began.
@@ -202,10 +208,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn first_node(&mut self) -> Result<(), PlanError> {
         let index = self.grid.piece.wrapping_sub(self.first_piece) as usize;
         let Some(piece) = self.pieces.get(index) else { return Ok(()) };
-        self.limits.sample(&self.kinematics, piece, piece.from, &mut self.grid.last)?;
-        let sample = &self.grid.last;
+        let number = self.grid.piece;
+        let (sample, _) = self.grid.samples();
+        self.limits.sample(&self.kinematics, piece, piece.from, sample)?;
         let node = Node {
-            piece: self.grid.piece,
+            piece: number,
             s: piece.from,
             length: 0.0,
             entry: 0.0,
@@ -243,14 +250,14 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         // A new source line is a new block; a dwell always is.
         let block = still || span.is_some_and(|span| !is_same_block(span, next.span));
         if !still {
-            self.limits.sample(&self.kinematics, next, from, &mut self.grid.last)?;
+            self.limits.sample(&self.kinematics, next, from, self.grid.samples().0)?;
         }
         let Some(tail) = self.nodes.back_mut() else { return Ok(false) };
         tail.stop |= stop || still;
         tail.dwell_ns += dwell_ns;
         tail.blocks = tail.blocks.saturating_add(u8::from(block));
         if !still {
-            let sample = &self.grid.last;
+            let (sample, _) = self.grid.samples();
             tail.right = sample.rows;
             tail.piece = number;
             tail.s = from;
@@ -269,13 +276,14 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let index = self.grid.piece.wrapping_sub(self.first_piece) as usize;
         let Some(piece) = self.pieces.get(index) else { return Ok(()) };
         let rows = self.limits.rows();
-        let remaining = piece.to - self.grid.s;
+        let (number, start) = (self.grid.piece, self.grid.s);
+        let remaining = piece.to - start;
         self.work.samples += 1;
         let guess = self.grid.step;
         let mut step = even(remaining, guess);
         let period = self.settings.servo_period_s;
-        let (last, sample) = (&self.grid.last, &mut self.grid.next);
-        self.limits.sample(&self.kinematics, piece, self.grid.s + step, sample)?;
+        let (last, sample) = self.grid.samples();
+        self.limits.sample(&self.kinematics, piece, start + step, sample)?;
         let mut next_guess = guess;
         for _ in 0..60 {
             let scales = last.variation(sample, rows);
@@ -297,12 +305,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             }
             step = shorter;
             self.work.samples += 1;
-            self.limits.sample(&self.kinematics, piece, self.grid.s + step, sample)?;
+            self.limits.sample(&self.kinematics, piece, start + step, sample)?;
         }
         let at_end = step >= remaining;
-        let between = self.limits.between(last, sample, step, piece, self.grid.s)?;
-        let s = if at_end { piece.to } else { self.grid.s + step };
-        let number = self.grid.piece;
+        let between = self.limits.between(last, sample, step, piece, start)?;
+        let s = if at_end { piece.to } else { start + step };
         let Some(tail) = self.nodes.back_mut() else { return Ok(()) };
         tail.length = step;
         tail.hard = lower(tail.hard, between);
@@ -332,7 +339,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.add(node);
         self.grid.s = s;
         self.grid.step = next_guess;
-        self.grid.last = self.grid.next;
+        self.grid.swapped = !self.grid.swapped;
         Ok(())
     }
 

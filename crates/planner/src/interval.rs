@@ -76,6 +76,7 @@ impl Gap {
 /// an x where the lowest is above the highest, the x at which those two borders meet is nearer to the answer and
 /// not below it: Newton's method, which ends after finitely many steps here because the pieces are straight (two as a
 /// rule; each costs one walk over the strips).
+#[inline]
 pub(crate) fn fastest_entry<const R: usize>(
     left: &Rows<R>,
     right: &Rows<R>,

@@ -242,6 +242,7 @@ impl<const R: usize> Limits<R> {
     ///
     /// # Errors
     /// A joint or axis leaves its travel between the nodes.
+    #[inline(always)]
     pub(crate) fn between(
         &self,
         a: &Sample<R>,
@@ -306,6 +307,7 @@ pub struct Feed {
 
 impl Feed {
     /// Speed along the path at ṡ = `speed`, as a share of what was asked for.
+    #[inline]
     pub(crate) fn share(&self, first: &[f64; 9], speed: f64) -> f64 {
         if self.speed > 0.0 { feed_length(first, self.group) * speed / self.speed } else { 0.0 }
     }
@@ -359,6 +361,7 @@ impl<const R: usize> Sample<R> {
 
     /// How much the strips change between two points, in shares of the limits: the measure that spaces the nodes.
     /// Also returns x̂, the scale of speed there.
+    #[inline(always)]
     pub(crate) fn variation(&self, other: &Self, rows: usize) -> Scales {
         let (mut steepest, mut bend) = ([0.0; 2], [0.0; 2]);
         for ((a1, a2), (b1, b2)) in self.rows.pairs(rows).zip(other.rows.pairs(rows)) {
@@ -368,7 +371,7 @@ impl<const R: usize> Sample<R> {
         }
         let (steepest, bend) = (highest(steepest), highest(bend));
         let by_bend = if bend * FASTEST > 2.0 { 2.0 / bend } else { FASTEST };
-        let speed = [other.hard, self.feed, other.feed, by_bend].into_iter().fold(self.hard, lower);
+        let speed = lower(lower(self.hard, other.hard), lower(lower(self.feed, other.feed), by_bend));
         let acceleration = if steepest > 0.0 { 1.0 / steepest } else { FASTEST };
         let mut change = [0.0; 2];
         for ((a1, a2), (b1, b2)) in self.rows.pairs(rows).zip(other.rows.pairs(rows)) {

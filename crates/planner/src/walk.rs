@@ -4,6 +4,7 @@
 
 use crate::PlanErrorKind;
 use crate::limits::Limits;
+use crate::pair::{higher, highest, with};
 use crate::path::Geometry;
 use core::ops::ControlFlow;
 use pkm_kins::{InverseError, Kinematics, Pose, Singularity, maths};
@@ -93,6 +94,15 @@ impl<const R: usize> Limits<R> {
 
     /// A joint or axis that turns back outside its travel around the second of three evenly spaced places.
     fn turns_outside(&self, [a, b]: &[[f64; R]; 2], c: &[f64; R]) -> Option<PlanErrorKind> {
+        // As a rule none does.
+        let pairs = a.as_chunks().0.iter().zip(b.as_chunks().0).zip(c.as_chunks().0);
+        let back = pairs.fold([0.0; 2], |most, ((&a, &b), &c)| {
+            let (before, after) = (with(a, b, |a, b| b - a), with(b, c, |b, c| b - c));
+            with(most, with(before, after, |before, after| before * after), higher)
+        });
+        if !(highest(back) > 0.0) {
+            return None;
+        }
         for (row, ((a, b), c)) in a.iter().zip(b).zip(c).enumerate().take(self.rows()) {
             if (b - a) * (c - b) < 0.0 {
                 // The top of the parabola through the three.

@@ -90,6 +90,7 @@ pub(crate) fn norm3(v: &Vector, from: usize) -> f64 {
 }
 
 /// |v| of the coordinates the feed counts.
+#[inline]
 pub fn feed_length(v: &Vector, group: FeedGroup) -> f64 {
     match group {
         FeedGroup::Xyz => norm3(v, 0),
