@@ -1,5 +1,6 @@
 //! Values: numbers, parameters, functions and bracketed expressions, evaluated while they are read.
 
+use crate::degrees;
 use crate::error::ErrorKind;
 use crate::lexer::{self, Function, Operator, Read, Rest, byte, fault, fault_here};
 use pkm_kins::maths;
@@ -233,7 +234,7 @@ fn function<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, f64>
             return Err(wrong());
         }
         let (rest, second) = bracket(after, scope, depth)?;
-        return Ok((rest, maths::atan2(x, second) * 180.0 / maths::PI));
+        return Ok((rest, degrees::atan2(x, second)));
     }
     if x.is_nan() {
         return Ok((rest, x));
@@ -258,14 +259,13 @@ fn exists<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, f64> {
 }
 
 fn call(function: Function, x: f64) -> Result<f64, ErrorKind> {
-    let radians = x * maths::PI / 180.0;
     Ok(match function {
         Function::Abs => x.abs(),
         Function::Acos if !(-1.0..=1.0).contains(&x) => return Err(ErrorKind::MathAcos { value: x }),
-        Function::Acos => maths::acos(x) * 180.0 / maths::PI,
+        Function::Acos => degrees::acos(x),
         Function::Asin if !(-1.0..=1.0).contains(&x) => return Err(ErrorKind::MathAsin { value: x }),
-        Function::Asin => maths::asin(x) * 180.0 / maths::PI,
-        Function::Cos => maths::cos(radians),
+        Function::Asin => degrees::asin(x),
+        Function::Cos => degrees::cos(x),
         Function::Exp => maths::exp(x),
         Function::Fix => maths::floor(x),
         Function::Fup => maths::ceil(x),
@@ -273,10 +273,10 @@ fn call(function: Function, x: f64) -> Result<f64, ErrorKind> {
         Function::Ln => maths::log(x),
         // Never -0: ATAN tells it from 0 (checked with rs274 2.9).
         Function::Round => maths::round(x) + 0.0,
-        Function::Sin => maths::sin(radians),
+        Function::Sin => degrees::sin(x),
         Function::Sqrt if x < 0.0 => return Err(ErrorKind::MathSqrt { value: x }),
         Function::Sqrt => maths::sqrt(x),
-        Function::Tan => maths::tan(radians),
+        Function::Tan => degrees::tan(x),
         Function::Atan | Function::Exists => x, // read by their own functions
     })
 }

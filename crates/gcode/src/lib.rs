@@ -31,6 +31,7 @@ extern crate std;
 #[cfg(feature = "std")]
 mod advice;
 mod block;
+mod degrees;
 mod error;
 mod expression;
 mod interpreter;
