@@ -365,7 +365,7 @@ fn judge(machine: &Machine, session: &Session) -> Result<String, String> {
             let off = before
                 .map_or(off, |(now, start, end)| off.min(off_path(&row.pose, &start, &end, &blocks[now])));
             most_off = most_off.max(off);
-            if off > ON_PATH {
+            if !(off <= ON_PATH) {
                 return Err(format!("row {k}: line {}: {off} mm off the path, at {:?}", row.line, row.pose));
             }
         }
@@ -374,7 +374,7 @@ fn judge(machine: &Machine, session: &Session) -> Result<String, String> {
     if done != blocks.len() {
         return Err(format!("the program ended after {done} of {} blocks", blocks.len()));
     }
-    if distance(&last.pose, &here) > 1e-9 {
+    if !(distance(&last.pose, &here) <= 1e-9) {
         return Err(format!("the program ended at {:?}, not at {here:?}", last.pose));
     }
     if most_back > 1e-6 {
@@ -456,6 +456,7 @@ fn sabotage(machine: &Machine, session: &Session) -> Result<String, String> {
         })?;
     }
     convict("the axes are moved by 1e-5 in one period", "row", &|s| s.rows[moving].pose[axis] += 1e-5)?;
+    convict("the axes are nowhere in one period", "row", &|s| s.rows[moving].pose[axis] = f64::NAN)?;
     convict("one period is missing", "our inverse says", &|s| {
         s.rows.remove(moving);
     })?;
