@@ -66,8 +66,9 @@ impl HexapodParameters {
 /// A valid hexapod.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hexapod {
-    base: [Vec3; 6],
-    platform: [Vec3; 6],
+    /// Ends of the struts, two and two.
+    base: [pair::Pair; 3],
+    platform: [pair::Pair; 3],
     /// Radius of the platform points: makes angles comparable with lengths.
     radius: f64,
     start_z: f64,
@@ -109,7 +110,7 @@ impl Hexapod {
             radius = radius.max(norm(*point));
         }
         let start_z = errors::coordinate(Key::of("start_z_mm"), p.start_z_mm)?;
-        Ok(Self { base: p.base_mm, platform: p.platform_mm, radius, start_z })
+        Ok(Self { base: pair::all(&p.base_mm), platform: pair::all(&p.platform_mm), radius, start_z })
     }
 
     /// Radius of the platform points, mm.
@@ -121,8 +122,8 @@ impl Hexapod {
     pub fn strut_points(&self, pose: &Pose) -> [[Vec3; 2]; 6] {
         let at = Attitude::of(pose);
         let mut ends = [[[0.0; 3]; 2]; 6];
-        for ((end, a), b) in ends.iter_mut().zip(&self.platform).zip(&self.base) {
-            *end = [*b, add([pose.x, pose.y, pose.z], at.rotate(*a))];
+        for ((end, a), b) in ends.iter_mut().zip(pair::apart(&self.platform)).zip(pair::apart(&self.base)) {
+            *end = [b, add([pose.x, pose.y, pose.z], at.rotate(a))];
         }
         ends
     }
@@ -130,9 +131,10 @@ impl Hexapod {
     #[inline]
     fn struts(&self, pose: &Pose, at: &Attitude) -> Result<[Strut; 6], InverseError> {
         let mut struts = [Strut::default(); 6];
-        for (((strut, a), b), joint) in struts.iter_mut().zip(&self.platform).zip(&self.base).zip(0u8..) {
-            let arm = at.rotate(*a);
-            let d = sub(add([pose.x, pose.y, pose.z], arm), *b);
+        let ends = pair::apart(&self.platform).into_iter().zip(pair::apart(&self.base));
+        for ((strut, (a, b)), joint) in struts.iter_mut().zip(ends).zip(0u8..) {
+            let arm = at.rotate(a);
+            let d = sub(add([pose.x, pose.y, pose.z], arm), b);
             let length = norm(d);
             if !(length > 1e-9) {
                 return Err(InverseError::ZeroStrut { joint });
@@ -194,19 +196,17 @@ impl TryFrom<HexapodParameters> for Hexapod {
     }
 }
 
-/// A linear system with six unknowns, solved by elimination with row pivoting. By hand: nalgebra's `lu().solve()` can panic.
-struct Solved {
-    x: [f64; 6],
+/// Linear systems with six unknowns and one matrix, solved by elimination with row pivoting. By hand: nalgebra's
+/// `lu().solve()` can panic.
+struct Solved<const N: usize> {
+    /// The unknowns of every system, unknown by unknown.
+    x: [[f64; N]; 6],
     determinant: f64,
 }
 
-/// Solves rows · x = right; `None` if a pivot is below 1e-14 (the rows here have entries of order 1).
-fn solve(rows: &[[f64; 6]; 6], right: &[f64; 6]) -> Option<Solved> {
-    let mut m = [[0.0; 7]; 6];
-    for ((full, row), r) in m.iter_mut().zip(rows).zip(right) {
-        full[..6].copy_from_slice(row);
-        full[6] = *r;
-    }
+/// Solves rows · x = right for N right sides; `None` if a pivot is below 1e-14 (the rows here have entries of order 1).
+fn solve<const N: usize>(rows: &[[f64; 6]; 6], right: &[[f64; N]; 6]) -> Option<Solved<N>> {
+    let (mut m, mut sides) = (*rows, *right);
     let mut determinant = 1.0;
     for column in 0..6 {
         let mut best = column;
@@ -221,50 +221,54 @@ fn solve(rows: &[[f64; 6]; 6], right: &[f64; 6]) -> Option<Solved> {
             return None;
         }
         if best != column {
-            // `swap` without an index that could be out of range.
-            let (above, below) = m.split_at_mut_checked(best)?;
-            core::mem::swap(above.get_mut(column)?, below.first_mut()?);
+            exchange(&mut m, column, best)?;
+            exchange(&mut sides, column, best)?;
             determinant = -determinant;
         }
         let (pivot, below) = m.get_mut(column..)?.split_first_mut()?;
+        let (side, sides_below) = sides.get_mut(column..)?.split_first_mut()?;
         let head = *pivot.get(column)?;
         determinant *= head;
-        for row in below {
+        for (row, side_below) in below.iter_mut().zip(sides_below) {
             let factor = *row.get(column)? / head;
             for (entry, p) in row.iter_mut().zip(pivot.iter()).skip(column) {
                 *entry -= factor * p;
             }
+            for (entry, p) in side_below.iter_mut().zip(side.iter()) {
+                *entry -= factor * p;
+            }
         }
     }
-    let mut x = [0.0; 6];
+    let mut x = [[0.0; N]; 6];
     for column in (0..6).rev() {
-        let row = m.get(column)?;
-        let mut sum = row[6];
+        let (row, mut sums) = (m.get(column)?, *sides.get(column)?);
         for (entry, known) in row.iter().zip(&x).skip(column).skip(1) {
-            sum -= entry * known;
+            for (sum, known) in sums.iter_mut().zip(known) {
+                *sum -= entry * known;
+            }
         }
-        *x.get_mut(column)? = sum / *row.get(column)?;
+        let head = *row.get(column)?;
+        *x.get_mut(column)? = sums.map(|sum| sum / head);
     }
     Some(Solved { x, determinant })
 }
 
+/// `swap` without an index that could be out of range; `above` < `below`.
+fn exchange<T>(rows: &mut [T; 6], above: usize, below: usize) -> Option<()> {
+    let (head, tail) = rows.split_at_mut_checked(below)?;
+    core::mem::swap(head.get_mut(above)?, tail.first_mut()?);
+    Some(())
+}
+
 /// 1/(‖A‖∞ ‖A⁻¹‖∞); 0 for a singular matrix.
 fn reciprocal_condition(rows: &[[f64; 6]; 6]) -> f64 {
-    let mut inverse_rows = [0.0; 6];
-    for column in 0..6 {
-        let mut unit = [0.0; 6];
-        if let Some(one) = unit.get_mut(column) {
+    let mut unit = [[0.0; 6]; 6];
+    for (i, row) in unit.iter_mut().enumerate() {
+        if let Some(one) = row.get_mut(i) {
             *one = 1.0;
         }
-        match solve(rows, &unit) {
-            None => return 0.0,
-            Some(solved) => {
-                for (sum, x) in inverse_rows.iter_mut().zip(solved.x) {
-                    *sum += fabs(x);
-                }
-            }
-        }
     }
+    let Some(inverse) = solve(rows, &unit) else { return 0.0 };
     let mut largest = 0.0_f64;
     for row in rows {
         let mut sum = 0.0;
@@ -274,7 +278,11 @@ fn reciprocal_condition(rows: &[[f64; 6]; 6]) -> f64 {
         largest = largest.max(sum);
     }
     let mut largest_inverse = 0.0_f64;
-    for sum in inverse_rows {
+    for row in inverse.x {
+        let mut sum = 0.0;
+        for entry in row {
+            sum += fabs(entry);
+        }
         largest_inverse = largest_inverse.max(sum);
     }
     1.0 / (largest * largest_inverse)
@@ -302,7 +310,7 @@ impl Kinematics for Hexapod {
         Self::finite(pose)?;
         let at = Attitude::of(pose);
         let mut all = [0.0; MAX_JOINTS];
-        let ends = self.platform.as_chunks().0.iter().zip(self.base.as_chunks().0);
+        let ends = self.platform.iter().zip(&self.base);
         for (((points, bases), lengths), joints) in
             ends.zip(all.as_chunks_mut().0).zip([[0, 1], [2, 3], [4, 5]])
         {
@@ -337,9 +345,9 @@ impl Kinematics for Hexapod {
         for iterations in 0..32 {
             let at = Attitude::of(&pose);
             let struts = self.struts(&pose, &at).map_err(|_| ForwardError::Singular { measure: 0.0 })?;
-            let mut right = [0.0; 6];
+            let mut right = [[0.0]; 6];
             residual_mm = 0.0;
-            for ((r, joint), strut) in right.iter_mut().zip(joints).zip(&struts) {
+            for (([r], joint), strut) in right.iter_mut().zip(joints).zip(&struts) {
                 *r = joint - strut.length;
                 residual_mm = residual_mm.max(fabs(*r));
             }
@@ -359,7 +367,7 @@ impl Kinematics for Hexapod {
                 let [a, b, c] = [turned(pose.a, seed.a), turned(pose.b, seed.b), turned(pose.c, seed.c)];
                 return Ok(Pose { x: pose.x, y: pose.y, z: pose.z, a, b, c, ..Pose::ZERO });
             }
-            let [dx, dy, dz, ox, oy, oz] = solved.x;
+            let [[dx], [dy], [dz], [ox], [oy], [oz]] = solved.x;
             // ω → (Ȧ, Ḃ, Ċ): the inverse of E, regular where cos B ≠ 0.
             let ((st, ct), (sp, cp)) = (at.theta, at.phi);
             if !(fabs(ct) > 1e-9) {
@@ -407,11 +415,10 @@ impl Kinematics for Hexapod {
         let (omega, alpha) = at.spin(v, a);
         let bend = bend(omega, alpha);
         let mut motion = JointMotion::default();
-        let platform = self.platform.as_chunks().0.iter();
         let lengths = motion.position.as_chunks_mut().0.iter_mut();
         let rates = motion.velocity.as_chunks_mut().0.iter_mut();
         let seconds = motion.acceleration.as_chunks_mut().0.iter_mut();
-        let struts = platform.zip(self.base.as_chunks().0).zip(lengths).zip(rates).zip(seconds);
+        let struts = self.platform.iter().zip(&self.base).zip(lengths).zip(rates).zip(seconds);
         for (((((points, bases), length), rate), second), joints) in struts.zip([[0, 1], [2, 3], [4, 5]]) {
             let (arm, d) = pair::strut(&at, pose, points, bases);
             *length = sqrt_2(pair::dot(d, d));
@@ -492,9 +499,16 @@ mod pair {
         map(a, b, |a, b| a * b)
     }
 
+    /// Six vectors, two and two.
+    pub(super) fn all([a, b, c, d, e, f]: &[Vec3; 6]) -> [Pair; 3] {
+        [[a, b], [c, d], [e, f]].map(|[u, v]| [[u[0], v[0]], [u[1], v[1]], [u[2], v[2]]])
+    }
+
+    /// And one by one again.
     #[inline]
-    pub(super) fn of([u, v]: &[Vec3; 2]) -> Pair {
-        [[u[0], v[0]], [u[1], v[1]], [u[2], v[2]]]
+    pub(super) fn apart([p, q, r]: &[Pair; 3]) -> [Vec3; 6] {
+        let one = |[x, y, z]: &Pair, k: usize| [x[k & 1], y[k & 1], z[k & 1]];
+        [one(p, 0), one(p, 1), one(q, 0), one(q, 1), one(r, 0), one(r, 1)]
     }
 
     /// The same vector for both.
@@ -526,9 +540,9 @@ mod pair {
 
     /// R a and the way from base to platform, p + R a − b.
     #[inline]
-    pub(super) fn strut(at: &Attitude, pose: &Pose, points: &[Vec3; 2], bases: &[Vec3; 2]) -> (Pair, Pair) {
-        let arm = rotate(at, of(points));
-        (arm, sub(add(both([pose.x, pose.y, pose.z]), arm), of(bases)))
+    pub(super) fn strut(at: &Attitude, pose: &Pose, point: &Pair, base: &Pair) -> (Pair, Pair) {
+        let arm = rotate(at, *point);
+        (arm, sub(add(both([pose.x, pose.y, pose.z]), arm), *base))
     }
 
     /// As [`Attitude::rotate`].
@@ -553,7 +567,7 @@ mod tests {
         let mut motion = JointMotion::default();
         for (i, strut) in struts.iter().enumerate() {
             motion.position[i] = strut.length;
-            let d = sub(add([pose.x, pose.y, pose.z], strut.arm), hexapod.base[i]);
+            let d = sub(add([pose.x, pose.y, pose.z], strut.arm), pair::apart(&hexapod.base)[i]);
             let d_v = add([v.x, v.y, v.z], cross(omega, strut.arm));
             let d_a = add([a.x, a.y, a.z], bend(omega, alpha).map(|row| dot(row, strut.arm)));
             let part = 1.0 / strut.length;

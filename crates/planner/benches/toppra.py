@@ -4,6 +4,13 @@
     python3 -m venv /tmp/toppra && /tmp/toppra/bin/pip install numpy toppra
     /tmp/toppra/bin/python crates/planner/benches/toppra.py
 
+And toppra's own C++ library, which is on PyPI too, on P01 and P03:
+
+    python3 -m venv /tmp/toppra-cpp && /tmp/toppra-cpp/bin/pip install cmeel-toppra cmeel-eigen
+    P=$(echo /tmp/toppra-cpp/lib/python3*/site-packages/cmeel.prefix)
+    g++ -O3 -std=c++17 -I$P/include -I$P/include/eigen3 crates/planner/benches/toppra.cpp -L$P/lib -ltoppra -Wl,-rpath,$P/lib -o /tmp/toppra-cpp/bench
+    /tmp/toppra/bin/python crates/planner/benches/toppra.py --cpp /tmp/toppra-cpp/bench
+
 Runs `cargo bench --package pkm-planner -- CASES` and toppra in turn, several times, and prints the medians over the rounds;
 in each round toppra's fastest of several. toppra is charged with its solver only (path and constraints are computed before the
 clock starts); the planner with everything: path, kinematics, spacing of the nodes, look-ahead and the planning part of
@@ -281,26 +288,44 @@ def ours(ids):
     return rows
 
 
+def plus_plus(program):
+    """What toppra.cpp prints: us a node, duration."""
+    if program is None:
+        return {}
+    text = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+    return {name: (float(us), float(s)) for name, us, s in map(str.split, text.splitlines())}
+
+
 def main():
-    table = cases()
-    ids = [name for name in table if not sys.argv[1:] or name in sys.argv[1:]]
+    table, wanted, program = cases(), sys.argv[1:], None
+    if "--cpp" in wanted:
+        at = wanted.index("--cpp")
+        program = wanted[at + 1]
+        del wanted[at:at + 2]
+    ids = [name for name in table if not wanted or name in wanted]
     prepared = {name: prepare(*table[name]) for name in ids}
     rounds = []
     for _ in range(ROUNDS):
-        rounds.append((ours(ids), {name: solve(*prepared[name]) for name in ids}))
+        rounds.append((ours(ids), {name: solve(*prepared[name]) for name in ids}, plus_plus(program)))
     middle = lambda pick: statistics.median(pick(*one) for one in rounds)
     print(f"toppra {importlib.metadata.version('toppra')} (Seidel), {ROUNDS} rounds in turn, medians")
     print("case   planner: nodes  us/node       s   toppra: nodes  us/node       s   ratio per node   whole case")
     worst = float("inf")
     for name in ids:
         count = len(prepared[name][0]) - 1
-        us = middle(lambda mine, his: mine[name][1]) / 1e3
-        their_us = middle(lambda mine, his: his[name][0]) / count * 1e6
+        us = middle(lambda mine, his, _: mine[name][1]) / 1e3
+        their_us = middle(lambda mine, his, _: his[name][0]) / count * 1e6
         mine = rounds[0][0][name]
         worst = min(worst, their_us / us)
         print(f"{name}  {mine[0]:15} {us:8.3f} {mine[2]:8.4f}  {count:14} {their_us:8.2f} "
               f"{rounds[0][1][name][1]:8.4f}  {their_us / us:14.0f} {their_us * count / (us * mine[0]):12.0f}")
     print(f"worst ratio per node: {worst:.0f} (bar: 50)")
+    for name in ids:
+        if name in rounds[0][2]:
+            us = middle(lambda mine, his, plus: mine[name][1]) / 1e3
+            their_us = middle(lambda mine, his, plus: plus[name][0])
+            print(f"{name}  toppra's C++, path and kinematics included: {their_us:.3f} us a node, {rounds[0][2][name][1]:.4f} s;"
+                  f" ratio {their_us / us:.1f} (bar: 5)")
 
 
 if __name__ == "__main__":
