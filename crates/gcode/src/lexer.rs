@@ -55,35 +55,52 @@ pub(crate) fn into_fault(error: nom::Err<Fault>) -> Fault {
 
 /// A decimal number: optional sign, digits, at most one point, at least one digit; no exponent. Correctly rounded.
 pub(crate) fn number(input: Rest<'_>) -> Read<'_, f64> {
-    let (negative, mut rest) = match input {
-        [sign @ (b'+' | b'-'), rest @ ..] => (*sign == b'-', rest),
+    let (negative, unsigned) = match input {
+        [sign @ (b'+' | b'-'), unsigned @ ..] => (*sign == b'-', unsigned),
         _ => (false, input),
     };
-    let (mut mantissa, mut digits, mut decimals, mut points) = (0_u64, 0_usize, 0_usize, 0_usize);
-    while let [byte @ (b'0'..=b'9' | b'.'), after @ ..] = rest {
-        if *byte == b'.' {
-            points += 1;
-        } else {
-            mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
-            digits += 1;
-            decimals += points;
+    let (rest, whole) = digits(unsigned, 0);
+    let (rest, mantissa, decimals, points) = match rest {
+        [b'.', fraction @ ..] => {
+            let (rest, mantissa) = digits(fraction, whole);
+            (rest, mantissa, fraction.len() - rest.len(), 1)
         }
-        rest = after;
-    }
-    if digits == 0 || points > 1 {
-        return Err(match rest.len() == input.len() {
-            true => fault_here(ErrorKind::NumberMissing, input),
-            false => fault(ErrorKind::BadNumber, input, rest),
-        });
+        _ => (rest, whole, 0, 0),
+    };
+    let count = unsigned.len() - rest.len() - points;
+    if count == 0 || rest.first() == Some(&b'.') {
+        return Err(not_a_number(input));
     }
     // Up to 15 digits and 10^-15: both exact in f64, so one division rounds correctly.
-    if digits <= 15 {
+    if count <= 15 {
         let magnitude = mantissa as f64 / POWERS[decimals];
         return Ok((rest, if negative { -magnitude } else { magnitude }));
     }
     let text = core::str::from_utf8(&input[..input.len() - rest.len()]).unwrap_or_default();
-    let number = text.parse().map_err(|_| fault(ErrorKind::BadNumber, input, rest))?;
+    let number = text.parse().map_err(|_| not_a_number(input))?;
     Ok((rest, number))
+}
+
+/// Appends the digits that the input begins with to a number; it wraps around from 20 digits on.
+#[inline]
+fn digits(mut input: Rest<'_>, mut number: u64) -> (Rest<'_>, u64) {
+    while let [digit @ b'0'..=b'9', rest @ ..] = input {
+        number = number.wrapping_mul(10).wrapping_add(u64::from(digit - b'0'));
+        input = rest;
+    }
+    (input, number)
+}
+
+/// The stretch that looks like a number.
+#[cold]
+fn not_a_number(input: Rest<'_>) -> nom::Err<Fault> {
+    let is_sign = |byte: &u8| matches!(byte, b'+' | b'-');
+    let sign = usize::from(input.first().is_some_and(is_sign));
+    let length = input[sign..].iter().take_while(|byte| byte.is_ascii_digit() || **byte == b'.').count();
+    match sign + length {
+        0 => fault_here(ErrorKind::NumberMissing, input),
+        length => fault(ErrorKind::BadNumber, input, &input[length..]),
+    }
 }
 
 const POWERS: [f64; 16] =

@@ -93,7 +93,7 @@ impl State {
         };
         self.modal.motion = code;
         let rise = end[axes.normal] - self.position[axes.normal];
-        self.inverse_time_rate(block, helix_length(from, to, centre, turns, rise), out);
+        self.inverse_time_rate(block, |_| helix_length(from, to, centre, turns, rise), out);
         if let Some(side) = self.compensates() {
             return self.arc_compensated(side, end, centre, turns, block, out);
         }

@@ -18,7 +18,7 @@ impl State {
         self.modal.motion = code;
         let end = self.end_point(block)?;
         if code == G1 {
-            self.inverse_time_rate(block, straight_length(&self.position, &end), out);
+            self.inverse_time_rate(block, |state| straight_length(&state.position, &end), out);
         }
         self.cutter.arc_refused = false;
         if let Some(side) = self.compensates() {
@@ -58,11 +58,16 @@ impl State {
     }
 
     /// G93: F moves per minute; the canon wants units per minute.
-    pub(crate) fn inverse_time_rate(&mut self, block: &Block, length: f64, out: &mut Out<'_>) {
+    pub(crate) fn inverse_time_rate(
+        &mut self,
+        block: &Block,
+        length: impl FnOnce(&Self) -> f64,
+        out: &mut Out<'_>,
+    ) {
         if self.modal.feed_mode == FeedMode::InverseTime
             && let Some(f) = block.get(b'F')
         {
-            self.modal.feed = (length * f).max(0.1);
+            self.modal.feed = (length(self) * f).max(0.1);
             out.emit(Canon::SetFeedRate(self.modal.feed));
         }
     }
