@@ -1,7 +1,7 @@
 //! Values: numbers, parameters, functions and bracketed expressions, evaluated while they are read.
 
-use crate::degrees;
 use crate::error::ErrorKind;
+use crate::functions;
 use crate::lexer::{self, Function, Operator, Read, Rest, byte, fault, fault_here};
 use pkm_kins::maths;
 
@@ -156,7 +156,7 @@ fn apply(left: f64, operator: Operator, right: f64, scope: &impl Scope) -> Resul
     }
     Ok(match operator {
         Operator::Power if left < 0.0 && maths::floor(right) != right => return Err(ErrorKind::MathPower),
-        Operator::Power => maths::pow(left, right),
+        Operator::Power => functions::pow(left, right),
         Operator::Multiply => left * right,
         Operator::Divide if right == 0.0 => return Err(ErrorKind::MathDiv0),
         Operator::Divide => left / right,
@@ -234,7 +234,7 @@ fn function<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, f64>
             return Err(wrong());
         }
         let (rest, second) = bracket(after, scope, depth)?;
-        return Ok((rest, degrees::atan2(x, second)));
+        return Ok((rest, functions::atan2(x, second)));
     }
     if x.is_nan() {
         return Ok((rest, x));
@@ -262,21 +262,21 @@ fn call(function: Function, x: f64) -> Result<f64, ErrorKind> {
     Ok(match function {
         Function::Abs => x.abs(),
         Function::Acos if !(-1.0..=1.0).contains(&x) => return Err(ErrorKind::MathAcos { value: x }),
-        Function::Acos => degrees::acos(x),
+        Function::Acos => functions::acos(x),
         Function::Asin if !(-1.0..=1.0).contains(&x) => return Err(ErrorKind::MathAsin { value: x }),
-        Function::Asin => degrees::asin(x),
-        Function::Cos => degrees::cos(x),
-        Function::Exp => maths::exp(x),
+        Function::Asin => functions::asin(x),
+        Function::Cos => functions::cos(x),
+        Function::Exp => functions::exp(x),
         Function::Fix => maths::floor(x),
         Function::Fup => maths::ceil(x),
         Function::Ln if x <= 0.0 => return Err(ErrorKind::MathLn { value: x }),
-        Function::Ln => maths::log(x),
+        Function::Ln => functions::ln(x),
         // Never -0: ATAN tells it from 0 (checked with rs274 2.9).
         Function::Round => maths::round(x) + 0.0,
-        Function::Sin => degrees::sin(x),
+        Function::Sin => functions::sin(x),
         Function::Sqrt if x < 0.0 => return Err(ErrorKind::MathSqrt { value: x }),
         Function::Sqrt => maths::sqrt(x),
-        Function::Tan => degrees::tan(x),
+        Function::Tan => functions::tan(x),
         Function::Atan | Function::Exists => x, // read by their own functions
     })
 }

@@ -31,9 +31,9 @@ extern crate std;
 #[cfg(feature = "std")]
 mod advice;
 mod block;
-mod degrees;
 mod error;
 mod expression;
+mod functions;
 mod interpreter;
 mod lexer;
 mod line;

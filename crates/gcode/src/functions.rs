@@ -1,6 +1,7 @@
-//! Trigonometry in degrees, as LinuxCNC computes it on a PC (dialect section 4): angles pass through the processor's 80-bit
-//! numbers with 64 bits of mantissa, so that FIX[2*SIN[30]] is 1 and COS[90] a trifle below 0 (checked with rs274 2.9). Here
-//! that is done with integers and with pairs of doubles, hence the same everywhere.
+//! The functions of expressions to the last bit, as LinuxCNC has them on a PC (dialect section 4): FIX and FUP make a whole
+//! number of it. Angles in degrees pass through the processor's 80-bit numbers with 64 bits of mantissa, so that
+//! FIX[2*SIN[30]] is 1 and COS[90] a trifle below 0; LN, EXP and powers are rounded to the nearest, so that LN[9]/LN[3] is 2
+//! and 125**[1/3] a trifle below 5 (checked with rs274 2.9). Here that is done with integers and with pairs of doubles, hence the same everywhere.
 
 use pkm_kins::maths;
 
@@ -46,6 +47,28 @@ pub(crate) fn acos(x: f64) -> f64 {
     let (sin, cos) = sin_cos(Pair(near, 0.0));
     degrees(if x.abs() < 1.0 { near + cos.less(Pair(x, 0.0)).nearest() / sin.0 } else { near })
 }
+
+/// Natural logarithm of a positive number.
+pub(crate) fn ln(x: f64) -> f64 {
+    logarithm(x).nearest()
+}
+
+/// e to the power of x.
+pub(crate) fn exp(x: f64) -> f64 {
+    power_of_e(Pair(x, 0.0))
+}
+
+/// x to the power of y; of a negative x only to a whole power.
+pub(crate) fn pow(x: f64, y: f64) -> f64 {
+    let plain = maths::pow(x, y);
+    if x == 0.0 || !(1e-250..1e250).contains(&plain.abs()) {
+        return plain;
+    }
+    power_of_e(logarithm(x.abs()).times(y)).copysign(plain)
+}
+
+/// ln 2: 40 bits, so that whole multiples are exact, and the rest.
+const LN_2: Pair = Pair(0.6931471805592082, 7.371002565167799e-13);
 
 /// π is this · 2⁻⁶².
 const PI: u64 = 0xC90F_DAA2_2168_C235;
@@ -162,8 +185,46 @@ const COS_TAIL: [f64; 9] = [
     2_432_902_008_176_640_000.0,
     1_124_000_727_777_607_680_000.0,
 ];
+const THIRD: Pair = Pair(1.0 / 3.0, 1.850371707708594e-17);
 const SIXTH: Pair = Pair(1.0 / 6.0, 9.251_858_538_542_97e-18);
 const TWENTY_FOURTH: Pair = Pair(1.0 / 24.0, 2.312_964_634_635_743e-18);
+
+/// ln x of a positive x, to some 60 bits.
+fn logarithm(x: f64) -> Pair {
+    let Some((mantissa, exponent)) = parts(x) else { return Pair(maths::log(x), 0.0) };
+    // x = m · 2^k with m from √½ to √2; ln m = 2 artanh((m - 1) / (m + 1))
+    let (mut m, mut k) = (mantissa as f64 * power_of_two(-52), exponent + 52);
+    if m > core::f64::consts::SQRT_2 {
+        (m, k) = (m / 2.0, k + 1);
+    }
+    let (above, below) = (m - 1.0, sum(m, 1.0));
+    let near = above / below.0;
+    let s = sum(near, Pair(above, 0.0).less(below.times(near)).nearest() / below.0);
+    let square = s.by(s);
+    let x = square.0;
+    let tail = (0..16).rev().fold(0.0, |sum, n| 1.0 / f64::from(2 * n + 5) + x * sum);
+    let small = THIRD.by(square).by(s).plus(x * x * s.0 * tail);
+    let k = f64::from(k);
+    let whole = sum(k * LN_2.0, k * LN_2.1);
+    whole.less(s.times(-2.0)).less(small.times(-2.0))
+}
+
+/// e to the power of x.
+fn power_of_e(x: Pair) -> f64 {
+    if !(1e-300..700.0).contains(&x.0.abs()) {
+        return maths::exp(x.0);
+    }
+    // x = k ln 2 + r, and Taylor
+    let k = maths::rint(x.0 / LN_2.0);
+    let r = sum(x.0 - k * LN_2.0, x.1 - k * LN_2.1);
+    let x = r.0;
+    let tail = (4..20).rev().fold(0.0, |sum, n| (1.0 + x * sum) / f64::from(n));
+    let square = r.by(r);
+    let cube = SIXTH.by(square).by(r);
+    let small = square.times(0.5).less(cube.times(-1.0)).plus(x * x * x / 6.0 * x * tail);
+    let one = Pair(1.0, 0.0).less(r.times(-1.0)).less(small.times(-1.0));
+    one.nearest() * power_of_two(k as i32)
+}
 
 /// a + b without loss (Knuth).
 fn sum(a: f64, b: f64) -> Pair {
@@ -222,5 +283,19 @@ mod tests {
         assert_eq!((atan2(1.0, 1.0), atan2(0.0, -1.0), atan2(-2.0, 0.0)), (45.0, 180.0, -90.0));
         assert_eq!((atan2(0.0, 0.0), sin(0.0), tan(0.0), cos(0.0)), (0.0, 0.0, 0.0, 1.0));
         assert_eq!(sin(1e300), maths::sin(1e300 * maths::PI / 180.0));
+    }
+
+    #[test]
+    fn logarithms_of_powers_are_whole() {
+        assert_eq!((ln(9.0) / ln(3.0), ln(1000.0) / ln(10.0)), (2.0, 2.999_999_999_999_999_6));
+        assert_eq!((ln(1.0), ln(2.0), exp(1.0)), (0.0, core::f64::consts::LN_2, core::f64::consts::E));
+        assert_eq!((exp(0.0), exp(800.0), exp(-800.0)), (1.0, f64::INFINITY, 0.0));
+        assert_eq!((pow(125.0, 1.0 / 3.0), pow(-2.0, 3.0)), (4.999_999_999_999_999, -8.0));
+        assert_eq!((pow(0.0, 2.0), pow(7.0, 0.0), pow(1e200, 2.0)), (0.0, 1.0, f64::INFINITY));
+        for n in -700..700 {
+            let x = f64::from(n) / 7.0;
+            assert!((ln(exp(x)) - x).abs() <= 2.3e-16 * x.abs().max(1.0), "{x}");
+            assert!((exp(x) / maths::exp(x) - 1.0).abs() < 3e-16, "{x}");
+        }
     }
 }
