@@ -1,7 +1,7 @@
 //! Paths, limits and feeds that no program should have: an error with its place, or a correct run. Never NaN, never a
 //! stop that is not the program's.
 
-use crate::catalogue::{Case, blend, identity, moma, polyline, xyz};
+use crate::catalogue::{Case, blend, identity, moma, on_moma, polyline, xyz};
 use crate::harness::{Disturbance, Rig, Sampling, TestPlanner, drive, limits, start, to_move, with_stack};
 use pkm_canon::Span;
 use pkm_kins::{Axis, InverseError, JointRange, Kinematics, OxForm, OxGlide, Pose};
@@ -15,9 +15,8 @@ const MODES: [PathMode; 3] = [PathMode::ExactStop, PathMode::ExactPath, PathMode
 const TOLERANCE: pkm_planner::path::Tolerance =
     pkm_planner::path::Tolerance { length_mm: 0.01, angle_rad: 1e-3 };
 
-fn on_moma(points: &[Vector], mode: PathMode, feed_mm_s: f64) -> Case {
-    let moves = polyline(points, mode);
-    Case { mechanism: moma(), velocity: vec![100.0; 2], acceleration: vec![1000.0; 2], moves, feed_mm_s }
+fn lines(points: &[Vector], mode: PathMode, feed_mm_s: f64) -> Case {
+    Case { feed_mm_s, ..on_moma(polyline(points, mode)) }
 }
 
 /// Runs to the end of the path within all limits; returns the seconds taken.
@@ -65,7 +64,7 @@ fn limits_that_make_no_machine_are_refused() {
 fn a_million_identical_points_are_no_motion() {
     with_stack(|| {
         let (a, b) = (xyz(0.0, -265.0, 0.0), xyz(10.0, -265.0, 0.0));
-        let case = on_moma(&[a, b], blend(0.01), 50.0);
+        let case = lines(&[a, b], blend(0.01), 50.0);
         let mut rig = Rig::new(&case, Sampling::SERVO);
         let point = Geometry::Line(Line { start: a, direction: [0.0; 9], length: 0.0 });
         for _ in 0..1_000_000 {
@@ -89,7 +88,7 @@ fn a_feed_of_nothing_is_refused_with_its_place_and_a_boundless_one_is_held_by_th
     with_stack(|| {
         let points = [xyz(-50.0, -270.0, 0.0), xyz(50.0, -270.0, 0.0)];
         for speed in [0.0, -1.0, f64::NAN] {
-            let case = on_moma(&points, PathMode::ExactPath, speed);
+            let case = lines(&points, PathMode::ExactPath, speed);
             let mut rig = Rig::new(&case, Sampling::SERVO);
             let span = Span { line: 7, ..Span::default() };
             let mut step = to_move(&case, case.moves[0]);
@@ -102,8 +101,8 @@ fn a_feed_of_nothing_is_refused_with_its_place_and_a_boundless_one_is_held_by_th
             }
             assert!(rig.planner.is_idle());
         }
-        let fast = clean("F1e9", &on_moma(&points, PathMode::ExactPath, 1e9));
-        let rapid = clean("rapid", &on_moma(&points, PathMode::ExactPath, f64::INFINITY));
+        let fast = clean("F1e9", &lines(&points, PathMode::ExactPath, 1e9));
+        let rapid = clean("rapid", &lines(&points, PathMode::ExactPath, f64::INFINITY));
         assert!((fast - rapid).abs() <= 1e-3, "{fast} s and {rapid} s");
     });
 }
@@ -126,7 +125,7 @@ fn blocks_of_a_ten_millionth_of_a_millimetre_run() {
                     xyz(along, -265.0 + 3e-8 * f64::from(k % 2), 0.0)
                 })
                 .collect();
-            let seconds = clean("1e-7 mm", &on_moma(&points, mode, 20.0));
+            let seconds = clean("1e-7 mm", &lines(&points, mode, 20.0));
             println!("{mode:?}: {seconds} s");
             // Every block takes at least the servo period it stops in; blended ones take no time to speak of.
             assert!(
@@ -150,7 +149,7 @@ fn a_path_along_a_singular_locus_ends_in_an_error_with_its_place() {
             for mode in MODES {
                 // From well inside up to the locus, then along it, then back.
                 let points = [xyz(0.0, -265.0, 0.0), singular(120.0), singular(90.0), xyz(0.0, -265.0, 0.0)];
-                let case = on_moma(&points, mode, f64::INFINITY);
+                let case = lines(&points, mode, f64::INFINITY);
                 let joints = [JointLimits {
                     range: JointRange { min: -1000.0, max: 1000.0 },
                     max_velocity: 100.0,
@@ -231,7 +230,7 @@ fn rotary_and_mixed_moves_hold_every_limit() {
 
 #[test]
 fn a_start_out_of_reach_or_travel_is_refused() {
-    let case = on_moma(&[xyz(0.0, -265.0, 0.0), xyz(1.0, -265.0, 0.0)], PathMode::ExactStop, 1.0);
+    let case = lines(&[xyz(0.0, -265.0, 0.0), xyz(1.0, -265.0, 0.0)], PathMode::ExactStop, 1.0);
     let far = Pose::from_array(xyz(900.0, -265.0, 0.0));
     with_stack(move || {
         let refused = TestPlanner::new(case.mechanism, limits(&case), SETTINGS, far);
@@ -246,7 +245,7 @@ fn a_move_that_leaves_the_travel_between_its_ends_is_refused_by_the_push() {
         // A line to where a half circle begins that bulges downwards.
         let points = [xyz(30.0, -265.0, 0.0), xyz(40.0, -265.0, 0.0), xyz(-40.0, -265.0, 0.0)];
         let arc = Arc::new(points[1], points[2], [0.0, -265.0, 0.0], [0.0, 0.0, 1.0], -1).unwrap();
-        let mut case = on_moma(&points, blend(0.1), 50.0);
+        let mut case = lines(&points, blend(0.1), 50.0);
         case.moves[1] = (Geometry::Arc(arc), blend(0.1));
         let joint_1 = |place: &Vector| case.mechanism.inverse(&Pose::from_array(*place)).unwrap()[0];
         let ends = points.iter().map(joint_1).fold(f64::MIN, f64::max);
@@ -309,7 +308,7 @@ fn a_joint_that_turns_back_outside_its_travel_just_after_the_start_of_a_line_is_
         for s in [-0.6, 0.4, 1.4] {
             assert!(range.contains(joint_1(turn_mm + s)), "{} {lowest}", joint_1(turn_mm + s));
         }
-        let case = on_moma(&points, blend(0.01), 50.0);
+        let case = lines(&points, blend(0.01), 50.0);
         let joint = JointLimits { range, max_velocity: 100.0, max_acceleration: 1000.0 };
         let wide = JointRange { min: -1000.0, max: 1000.0 };
         let limits = Limits::new(&[joint, JointLimits { range: wide, ..joint }], &[], 0.0).unwrap();
@@ -337,7 +336,7 @@ fn a_long_line_that_ends_out_of_travel_or_reach_is_refused_by_the_push() {
             JointRange { min: joint_1(40.0), ..all }
         };
         for (range, far, expected_mm) in [(tight, 49.5, 40.0), (all, 149.5, f64::NAN)] {
-            let case = on_moma(&[points[0], xyz(far, -270.0, 0.0)], blend(0.01), 50.0);
+            let case = lines(&[points[0], xyz(far, -270.0, 0.0)], blend(0.01), 50.0);
             let joint = JointLimits { range, max_velocity: 100.0, max_acceleration: 1000.0 };
             let limits = Limits::new(&[joint, JointLimits { range: all, ..joint }], &[], 0.0).unwrap();
             let mut planner =
@@ -394,9 +393,9 @@ fn reversals_and_absurd_tolerances_run() {
             xyz(10.0, -265.0, 0.0),
             xyz(10.0, -275.0, 0.0),
         ];
-        let stop = clean("exact stop", &on_moma(&there, PathMode::ExactStop, f64::INFINITY));
+        let stop = clean("exact stop", &lines(&there, PathMode::ExactStop, f64::INFINITY));
         for p in [1e-12, 1e-6, 0.01, 1e9] {
-            let blended = clean("reversal", &on_moma(&there, blend(p), f64::INFINITY));
+            let blended = clean("reversal", &lines(&there, blend(p), f64::INFINITY));
             println!("P {p}: {blended} s, exact stop {stop} s");
             // There is no blend of a reversal: it stops there, and only there.
             assert!(blended <= stop + 1e-3, "P {p}: {blended} s of {stop} s");

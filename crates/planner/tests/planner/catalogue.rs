@@ -95,7 +95,7 @@ fn zigzag() -> Vec<Vector> {
     (0..=20).map(|k| xyz(-40.0 + 4.0 * f64::from(k), -265.0 + 4.0 * f64::from(k % 2), 0.0)).collect()
 }
 
-fn on_moma(moves: Vec<(Geometry, PathMode)>) -> Case {
+pub(crate) fn on_moma(moves: Vec<(Geometry, PathMode)>) -> Case {
     Case {
         mechanism: moma(),
         velocity: vec![100.0; 2],

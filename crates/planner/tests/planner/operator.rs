@@ -1,6 +1,6 @@
 //! Single block, a queue that runs dry, and what a smoother behind the planner has to wait for.
 
-use crate::catalogue::{Case, all, flower_on_moma, moma, polyline, xyz};
+use crate::catalogue::{Case, all, flower_on_moma, on_moma, polyline, xyz};
 use crate::harness::{Differences, Rig, Sampling, TestPlanner, limits, random, start, to_move, with_stack};
 use pkm_canon::Span;
 use pkm_planner::path::Vector;
@@ -142,14 +142,7 @@ fn single_block_stops_at_the_end_of_the_block_it_is_in() {
     with_stack(|| {
         for mode in [PathMode::ExactPath, crate::catalogue::blend(0.1)] {
             let points = [-30.0, -10.0, 10.0, 30.0].map(|x| xyz(x, -265.0 + 0.2 * x * x / 30.0, 0.0));
-            let moves = polyline(&points, mode);
-            let case = Case {
-                mechanism: moma(),
-                velocity: vec![100.0; 2],
-                acceleration: vec![1000.0; 2],
-                moves,
-                feed_mm_s: 50.0,
-            };
+            let case = Case { feed_mm_s: 50.0, ..on_moma(polyline(&points, mode)) };
             let moves = blocks(&case);
             let mut planner = planner(&case, 0);
             let mut next = 0;
@@ -173,17 +166,8 @@ fn single_block_stops_at_the_end_of_the_block_it_is_in() {
 #[test]
 fn a_dwell_is_a_block_of_its_own() {
     with_stack(|| {
-        let moves = polyline(
-            &[xyz(0.0, -265.0, 0.0), xyz(5.0, -265.0, 0.0), xyz(9.0, -265.0, 0.0)],
-            PathMode::ExactPath,
-        );
-        let case = Case {
-            mechanism: moma(),
-            velocity: vec![100.0; 2],
-            acceleration: vec![1000.0; 2],
-            moves,
-            feed_mm_s: 50.0,
-        };
+        let points = [0.0, 5.0, 9.0].map(|x| xyz(x, -265.0, 0.0));
+        let case = Case { feed_mm_s: 50.0, ..on_moma(polyline(&points, PathMode::ExactPath)) };
         let moves = blocks(&case);
         let mut planner = planner(&case, 0);
         planner.set_single_block(true);

@@ -1,7 +1,7 @@
 //! Random paths that prefer trouble: reversals, tiny blocks, repeated points, arcs into lines, every path mode, extreme
 //! tolerances. Whatever the path, no joint exceeds its limits at any tick, the machine arrives, and it never stalls.
 
-use crate::catalogue::{Case, identity, moma, xyz};
+use crate::catalogue::{Case, identity, on_moma, xyz};
 use crate::harness::{Disturbance, Sampling, drive, random, with_stack};
 use pkm_kins::Axis;
 use pkm_planner::PathMode;
@@ -98,7 +98,7 @@ fn random_paths_on_moma() {
     hold(|seed| {
         let feed_mm_s = [f64::INFINITY, 1e9, 60.0, 5.0][(random(seed) % 4) as usize];
         let moves = path(seed, [0.0, -265.0], 35.0);
-        Case { mechanism: moma(), velocity: vec![100.0; 2], acceleration: vec![1000.0; 2], moves, feed_mm_s }
+        Case { feed_mm_s, ..on_moma(moves) }
     });
 }
 
