@@ -27,6 +27,7 @@ fn exercise(mechanism: &Mechanism) {
     black_box((place, found));
     let _ = black_box(mechanism.jacobian(&pose));
     let _ = black_box(mechanism.motion(&pose, &unknown(pose), &unknown(pose)));
+    let _ = black_box(mechanism.passage(&pose, &unknown(pose), &unknown(pose)));
     let _ = black_box(mechanism.singularity(&pose));
     let _ = black_box(mechanism.inverse_branches(&pose));
     let _ = black_box(mechanism.forward_branches(&joints, &pose));
