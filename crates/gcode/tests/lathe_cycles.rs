@@ -4,8 +4,8 @@
 mod support;
 
 use pkm_canon::{Canon, CanonSink, Span};
-use pkm_gcode::{Interpreter, MemorySource, Settings, Status};
-use pkm_kins::maths;
+use pkm_gcode::{Interpreter, MemorySource, Settings, Status, static_check};
+use pkm_kins::{Axis, AxisSet, maths};
 use support::generator::Random;
 
 type Point = [f64; 2];
@@ -326,4 +326,28 @@ fn what_is_wrong_is_said_with_its_line() {
         let line = if place == 0 { lines } else { 2 + place };
         assert_eq!(run(profile, cycle), Some((code, line as u32)), "{profile}\n{cycle}");
     }
+}
+
+/// In a profile A and C are corners, U and W increments: words of axes that the machine lacks are wrong only elsewhere.
+#[test]
+fn profile_words_need_no_axes() {
+    let settings = Settings { axes: AxisSet::new(&[Axis::X, Axis::Y, Axis::Z]), ..Settings::default() };
+    let found = |words: &str, use_of_subs: &str| -> Vec<(String, u32, u32, u32)> {
+        let text = format!(
+            "G18 G21 F100\no7 sub\nG1 Z-9\no7 endsub\no100 sub\nG0 X2 Z0\nG1 Z-4 {words}\nX6 Z-5\no7 call\n\
+             o100 endsub\nG0 X20 Z1\n{use_of_subs}\nM2\n"
+        );
+        let said = static_check(&mut MemorySource::new(text.as_bytes()), &settings, None, "program");
+        said.into_iter().map(|d| (d.code, d.line, d.column, d.end_column)).collect()
+    };
+    let wrong = |code: &str, column: u32| (code.to_string(), 7, column, column + 1);
+    assert_eq!(found("C1", "G71 Q100"), []);
+    assert_eq!(found("U1 W-1", "G70 Q100"), []);
+    assert_eq!(found("A1", "#1=100\nG72 Q#1"), []);
+    assert_eq!(found("B1", "G71 Q100"), [wrong("axis-unavailable", 8)]);
+    assert_eq!(found("C1", "o100 call"), [wrong("axis-unavailable", 8)]);
+    assert_eq!(found("U1 W1", "o100 call\nG71 Q7"), [8, 11].map(|column| wrong("axis-unavailable", column)));
+    // Subs of a profile's sub belong to it.
+    let nested = "o101 sub\nG0 X2\no100 call\no101 endsub\nG71 Q101";
+    assert_eq!(found("C1", nested), []);
 }

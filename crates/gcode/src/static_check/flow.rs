@@ -10,7 +10,7 @@ use crate::lexer::{Keyword, into_fault};
 use crate::o_word::{self, LabelText};
 use crate::parameters::{ARGUMENTS, Parameters};
 use crate::source::LineSource;
-use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 use pkm_canon::Span;
 use pkm_canon::diagnostic::Severity;
@@ -369,22 +369,13 @@ impl StaticCheck<'_> {
         if !self.sub_ends_program && !self.calls_unknown {
             self.findings.extend(endless);
         }
+        self.finish_profiles();
         self.finish_names(parameters);
         if self.calls_unknown {
             return;
         }
-        // Called from the main program, directly or not.
-        let mut callees: BTreeMap<&Name, Vec<&Name>> = BTreeMap::new();
-        for (label, (.., callers)) in &self.calls {
-            callers.iter().for_each(|caller| callees.entry(caller).or_default().push(label));
-        }
         let main = Name::new();
-        let mut reached: BTreeSet<&Name> = BTreeSet::from([&main]);
-        let mut waiting = Vec::from([&main]);
-        while let Some(caller) = waiting.pop() {
-            let called = callees.get(caller).into_iter().flatten().copied();
-            waiting.extend(called.filter(|label| reached.insert(label)));
-        }
+        let reached = self.reached_from(core::iter::once(&main));
         let unused: Vec<(Span, Vec<u8>)> = self
             .definitions
             .iter()

@@ -5,6 +5,7 @@
 
 mod flow;
 mod names;
+mod profiles;
 mod quirks;
 
 use crate::advice::{self, Names, note, text};
@@ -23,6 +24,7 @@ use flow::{Definition, Open};
 use names::{Reads, Unknowns};
 use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
+use profiles::Profiles;
 
 /// Findings kept.
 const MOST_FINDINGS: usize = 1000;
@@ -116,6 +118,7 @@ struct StaticCheck<'a> {
     /// Labels of o-words that were wrong.
     wrong: BTreeSet<Name>,
     reads: Reads,
+    profiles: Profiles,
     /// A line whose nesting is wanted; 0 = none.
     wanted_line: u32,
     nesting: Nesting,
@@ -140,6 +143,7 @@ impl<'a> StaticCheck<'a> {
             endless_with_calls: Vec::new(),
             wrong: BTreeSet::new(),
             reads: Reads::default(),
+            profiles: Profiles::default(),
             wanted_line: 0,
             nesting: Nesting::Nowhere,
         }
@@ -247,7 +251,7 @@ impl<'a> StaticCheck<'a> {
             self.quirks();
         }
         let reader = crate::block::Reader {
-            axes: self.settings.axes,
+            axes: self.axes_here(),
             diameter: false,
             spindles: self.settings.spindles.min(8),
             machine_codes: self.settings.machine_codes,
@@ -261,6 +265,7 @@ impl<'a> StaticCheck<'a> {
         if let Err(error) = read {
             return self.fail(error);
         }
+        self.take_profile_words();
         self.take_settings();
         self.take_ends();
         if let Some(number) = self.block.m(MGroup::User)
@@ -273,6 +278,7 @@ impl<'a> StaticCheck<'a> {
             && self.block.has(b'Q')
         {
             let label = self.number_label(b'Q');
+            self.takes_profile(label.as_ref());
             self.calls_sub(label, self.block.word_span(b'Q'));
         }
     }
