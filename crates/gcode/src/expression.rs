@@ -81,8 +81,7 @@ fn signed_value<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, 
         signs += 1;
         rest = &rest[1..];
     }
-    let signed_number = matches!(rest, [b'+' | b'-', ..]);
-    if scope.strict() && signs + i32::from(signed_number) > 1 {
+    if signs > 0 && scope.strict() && signs + i32::from(matches!(rest, [b'+' | b'-', ..])) > 1 {
         return Err(fault(ErrorKind::DoubleSign, input, rest));
     }
     let (after, value) = match rest {
