@@ -61,6 +61,8 @@ pub(crate) struct Block {
     m: [i16; M_GROUPS],
     m_stretches: [Stretch; M_GROUPS],
     m_count: u8,
+    /// S is executed by a part of the block that follows (remapped codes).
+    pub(crate) speed_follows: bool,
     pub(crate) settings: Vec<Setting, MAX_SETTINGS>,
     /// Stretches of [`Line::code`] between the parentheses.
     pub(crate) comments: Vec<Stretch, MAX_COMMENTS>,
@@ -82,6 +84,7 @@ impl Block {
             m: [-1; M_GROUPS],
             m_stretches: [(0, 0); M_GROUPS],
             m_count: 0,
+            speed_follows: false,
             settings: Vec::new(),
             comments: Vec::new(),
             motion: None,
@@ -96,6 +99,7 @@ impl Block {
         self.g = [-1; G_GROUPS];
         self.m = [-1; M_GROUPS];
         self.m_count = 0;
+        self.speed_follows = false;
         self.settings.clear();
         self.comments.clear();
         self.motion = None;
@@ -126,6 +130,45 @@ impl Block {
         block.g_stretches = self.g_stretches;
         (block.file, block.line, block.whole) = (self.file, self.line, self.whole);
         block
+    }
+
+    /// Keeps what is executed in some steps (dialect section 7), from the first to before the last. In inverse time F belongs to the motion.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn keep_steps(&mut self, from: u8, until: u8, inverse_time: bool) {
+        let kept = |step: u8| (from..until).contains(&step);
+        for group in GGroup::ALL {
+            let dwells = group == GGroup::NonModal && self.g(group) == Some(G4);
+            if !kept(if dwells { 13 } else { group.step() }) {
+                self.g[group as usize] = -1;
+            }
+        }
+        for group in MGroup::REMAPPED {
+            if !kept(group.step()) {
+                self.m[group as usize] = -1;
+            }
+        }
+        self.speed_follows = kept(2) && !kept(5) && self.has(b'S');
+        for (letter, step) in [(b'F', 4), (b'S', 5), (b'T', 6)] {
+            if !(kept(step) || letter == b'F' && inverse_time && kept(26)) {
+                self.set(letter, None);
+            }
+        }
+        if !kept(1) {
+            self.comments.clear();
+        }
+        if !kept(26) {
+            self.motion = None;
+        }
+    }
+
+    /// Takes over the values of the words that another block has too.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn take_words(&mut self, other: &Self) {
+        for (place, value) in self.words.iter_mut().enumerate() {
+            if other.present & (1 << place) != 0 {
+                *value = other.words[place];
+            }
+        }
     }
 
     /// Sets a word or takes it away; where it stands is where it stood.
@@ -229,7 +272,7 @@ impl Block {
         line: &Line,
         start: usize,
         scope: &impl Scope,
-        reader: &Reader,
+        reader: &Reader<'_>,
     ) -> Result<(), Error> {
         self.clear(line);
         let code = line.code();
@@ -250,7 +293,7 @@ impl Block {
         line: &Line,
         start: usize,
         scope: &impl Scope,
-        reader: &Reader,
+        reader: &Reader<'_>,
         mut lost: impl FnMut(&[u8]),
     ) {
         self.clear(line);
@@ -284,7 +327,7 @@ impl Block {
         letter: u8,
         input: Rest<'a>,
         scope: &impl Scope,
-        reader: &Reader,
+        reader: &Reader<'_>,
     ) -> Result<Rest<'a>, nom::Err<Fault>> {
         let offset = |rest: Rest<'_>| line.code().len() - rest.len();
         match letter {
@@ -398,11 +441,13 @@ impl Block {
         &mut self,
         line: &Line,
         code: GCode,
-        reader: &Reader,
+        reader: &Reader<'_>,
         from: Rest<'_>,
         to: Rest<'_>,
     ) -> Result<(), nom::Err<Fault>> {
         let group = GGroup::of(code).filter(|_| reader.newer || !matches!(code, G6..=G6_2));
+        #[cfg(feature = "alloc")]
+        let group = group.or_else(|| reader.remaps.has_g(code).then_some(GGroup::Motion));
         let group = group.ok_or_else(|| {
             let kind = match code {
                 // LinuxCNC 2.10's second form of NURBS; it reserves G6.3.
@@ -510,7 +555,12 @@ pub(crate) const AXIS_LETTERS: [u8; 9] = *b"XYZABCUVW";
 
 /// What reading a block depends on besides parameters.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Reader {
+pub(crate) struct Reader<'a> {
+    /// Codes that a sub stands for.
+    #[cfg(feature = "alloc")]
+    pub(crate) remaps: &'a crate::remap::Remaps,
+    #[cfg(not(feature = "alloc"))]
+    pub(crate) remaps: core::marker::PhantomData<&'a ()>,
     pub(crate) axes: AxisSet,
     /// X words are diameters (G7).
     pub(crate) diameter: bool,
@@ -524,10 +574,16 @@ pub(crate) struct Reader {
     pub(crate) largest: f64,
 }
 
-impl Reader {
+impl Reader<'_> {
     /// The modal group of an M code; the machine's own are user codes.
     fn m_group(&self, number: i32) -> Option<MGroup> {
-        if self.machine_codes.contains(number) { Some(MGroup::User) } else { MGroup::of(number) }
+        if self.machine_codes.contains(number) {
+            return Some(MGroup::User);
+        }
+        let group = MGroup::of(number);
+        #[cfg(feature = "alloc")]
+        let group = group.or_else(|| self.remaps.m_group(number));
+        group
     }
 
     /// Range checks that hold for a letter wherever it is used.

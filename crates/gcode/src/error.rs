@@ -110,6 +110,8 @@ errors! {
     ModalClashM { first: i32, second: i32, group: &'static str } "modal-clash" "M{second} and M{first} belong to one modal group ({group})" "use one of them per block";
     WordRepeated { letter: char } "word-repeated" "a second {letter} word in the block" "use each letter once per block";
     WordUnused { letter: char, users: &'static str } "word-unused" "no code in this block uses the {letter} word (only {users} do)" "remove the word, or add the code it belongs to";
+    RemapWord { letter: char } "word-missing" "the remapped code needs {letter}" "add it: its argspec asks for it";
+    RemapZero { letter: char } "word-missing" "the remapped code needs {letter} greater than 0" "set it first: its argspec asks for it";
     WordMissing { letter: char, code: Code } "word-missing" "G{code} needs the {letter} word" "add it to the block";
     WordMissingM { letter: char, number: i32 } "word-missing" "M{number} needs the {letter} word" "add it to the block";
     AxisUnavailable { letter: char } "axis-unavailable" "this machine has no {letter} axis" "remove the word, or choose another machine";

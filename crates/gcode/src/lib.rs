@@ -43,6 +43,8 @@ mod o_word;
 #[cfg(feature = "alloc")]
 mod parameter_file;
 mod parameters;
+#[cfg(feature = "alloc")]
+mod remap;
 mod settings;
 mod simulation;
 mod source;
@@ -55,6 +57,8 @@ pub use interpreter::{Interpreter, Status};
 #[cfg(feature = "alloc")]
 pub use parameter_file::ParameterFile;
 pub use parameters::Parameters;
+#[cfg(feature = "alloc")]
+pub use remap::{Remap, RemapError};
 pub use settings::{Dialect, MachineCodes, Settings};
 pub use simulation::{SimulatedMachine, canon_text, canon_text_of};
 #[cfg(feature = "std")]

@@ -103,6 +103,47 @@ impl GGroup {
         })
     }
 
+    /// The step in which a block executes the group (dialect section 7).
+    #[cfg(feature = "alloc")]
+    pub(crate) const fn step(self) -> u8 {
+        match self {
+            Self::Spindle => 2,
+            Self::FeedMode => 3,
+            Self::Plane => 14,
+            Self::Units => 15,
+            Self::Lathe => 16,
+            Self::Compensation => 17,
+            Self::ToolLength => 18,
+            Self::System => 19,
+            Self::Path => 20,
+            Self::Distance => 21,
+            Self::ArcCentre => 22,
+            Self::Retract => 23,
+            Self::NonModal => 24,
+            Self::G92 => 25,
+            Self::Motion => 26,
+        }
+    }
+
+    #[cfg(feature = "alloc")]
+    pub(crate) const ALL: [Self; G_GROUPS] = [
+        Self::NonModal,
+        Self::Motion,
+        Self::Plane,
+        Self::Distance,
+        Self::ArcCentre,
+        Self::FeedMode,
+        Self::Units,
+        Self::Compensation,
+        Self::ToolLength,
+        Self::Retract,
+        Self::System,
+        Self::Path,
+        Self::Spindle,
+        Self::Lathe,
+        Self::G92,
+    ];
+
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::NonModal => "group 0, non-modal",
@@ -156,6 +197,25 @@ impl MGroup {
             100..=199 => Self::User,
             _ => return None,
         })
+    }
+
+    /// LinuxCNC's groups 4 to 10, in which free codes may be executed.
+    #[cfg(feature = "alloc")]
+    pub(crate) const REMAPPED: [Self; 7] =
+        [Self::Stop, Self::Io, Self::Tool, Self::Spindle, Self::Coolant, Self::Override, Self::User];
+
+    /// The step in which a block executes the group (dialect section 7).
+    #[cfg(feature = "alloc")]
+    pub(crate) const fn step(self) -> u8 {
+        match self {
+            Self::Io => 7,
+            Self::Tool => 8,
+            Self::Spindle => 9,
+            Self::Coolant => 10,
+            Self::Override => 11,
+            Self::User => 12,
+            Self::Stop | Self::Call => 27,
+        }
     }
 
     pub(crate) const fn name(self) -> &'static str {

@@ -6,7 +6,7 @@ mod support;
 use pkm_canon::{Canon, CanonSink, Span};
 use pkm_gcode::{
     Dialect, ErrorKind, Interpreter, LineSource, MachineCodes, MemorySource, ParameterFile, Parameters,
-    Settings, ToolTable, static_check,
+    Remap, Settings, ToolTable, static_check,
 };
 use std::collections::BTreeSet;
 
@@ -301,6 +301,15 @@ fn every_row_of_the_catalogue_is_raised() {
     for bytes in [changed.as_bytes(), cut, b"5161 x\n", b"5162 1\n5161 1\n"] {
         let (_, error) = ParameterFile::read(bytes, &mut Parameters::default()).expect_err("a damaged file");
         told.insert((error.code(), error.to_string()));
+    }
+    for (remap, program) in [("M400 argspec=P ngc=a", "M400|M2"), ("M400 argspec=> ngc=a", "M400|M2")] {
+        let settings = settings(Dialect::Pkm);
+        let mut interpreter = Interpreter::new(settings);
+        assert!(interpreter.add_remap(Remap::parse(remap, &settings).expect("a remap")));
+        let text = program.replace('|', "\n");
+        let mut source = MemorySource::new(text.as_bytes());
+        let error = interpreter.step(&mut source, &mut Nothing).expect_err("words are missing");
+        told.insert((error.kind.code(), error.to_string()));
     }
     let mut table = ToolTable::parse(b"T1 P2\nT2 P2\n", |_, _| {}).expect("a table");
     let error = table.arrange_by_pocket().expect_err("a pocket for two");

@@ -18,6 +18,10 @@ impl State {
         block.motion = self.motion_of(block)?;
         self.check_polar(block)?;
         check_g_codes(block, self)?;
+        #[cfg(feature = "alloc")]
+        if self.has_remapped_code(block) {
+            return self.check_remapped(block);
+        }
         check_m_codes(block, self.settings.dialect)?;
         if self.splines.is_open() && self.settings.dialect == Dialect::Pkm {
             self.check_open_spline(block)?;
@@ -35,6 +39,17 @@ impl State {
         Ok(())
     }
 
+    /// True for a G code that RS274 does not know and a sub stands for.
+    fn is_free(&self, code: GCode) -> bool {
+        #[cfg(feature = "alloc")]
+        return !self.remaps.is_empty() && self.remaps.has_g(code);
+        #[cfg(not(feature = "alloc"))]
+        {
+            let _ = code;
+            false
+        }
+    }
+
     /// RS274/NGC 3.5: axis words without a motion code repeat the modal motion.
     fn motion_of(&self, block: &Block) -> Result<Option<GCode>, Error> {
         let (axes, polar) = (block.has_axis(), block.has_polar());
@@ -47,6 +62,8 @@ impl State {
             } else if let Some(other) = other {
                 let kind = ErrorKind::AxisClash { first: Code(other), second: Code(motion) };
                 return Err(block.motion_error(kind));
+            } else if self.is_free(motion) {
+                // Its argspec says what it needs.
             } else if !axes && !polar && !matches!(motion, G0 | G1 | G2 | G3 | G5_2 | G5_3 | G6_2 | 700..=722)
             {
                 return Err(block.motion_error(ErrorKind::AxisMissing { code: Code(motion) }));
@@ -81,7 +98,7 @@ impl State {
     }
 
     /// Dialect section 8: a word nobody uses is an error.
-    fn check_words(&self, block: &Block) -> Result<(), Error> {
+    pub(super) fn check_words(&self, block: &Block) -> Result<(), Error> {
         let motion = block.motion.unwrap_or(G80);
         let newer = self.settings.dialect != Dialect::LinuxCnc29;
         let g0 = block.g(GGroup::NonModal);

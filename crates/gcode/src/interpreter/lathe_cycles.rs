@@ -106,7 +106,7 @@ impl Interpreter {
     }
 
     /// A and C are corners in a profile, U and W increments: whatever axes the machine has.
-    pub(super) fn profile_reader(&self, reader: Reader) -> Reader {
+    pub(super) fn profile_reader<'a>(&self, reader: Reader<'a>) -> Reader<'a> {
         match self.lathe {
             Some(_) => Reader { axes: AxisSet::new(&Axis::ALL), ..reader },
             None => reader,

@@ -20,6 +20,8 @@ mod probing;
 mod queue;
 #[cfg(feature = "alloc")]
 mod recovery;
+#[cfg(feature = "alloc")]
+mod remap;
 mod saved;
 mod splines;
 #[cfg(feature = "std")]
@@ -133,6 +135,8 @@ pub struct Interpreter {
     flow: flow::Flow,
     #[cfg(feature = "alloc")]
     recovery: recovery::Recovery,
+    #[cfg(feature = "alloc")]
+    remapping: remap::Remapping,
     /// The lathe cycle whose profile is being read.
     #[cfg(feature = "alloc")]
     lathe: Option<alloc::boxed::Box<lathe_cycles::Profile>>,
@@ -158,6 +162,8 @@ impl Interpreter {
             flow: flow::Flow::default(),
             #[cfg(feature = "alloc")]
             recovery: recovery::Recovery::default(),
+            #[cfg(feature = "alloc")]
+            remapping: remap::Remapping::default(),
             #[cfg(feature = "alloc")]
             lathe: None,
         }
@@ -480,6 +486,20 @@ impl Interpreter {
             self.take_profile_block()?;
             return Ok(Status::Running);
         }
+        #[cfg(feature = "alloc")]
+        if self.holds_remap() {
+            return self.begin_remapped(source, sink);
+        }
+        self.execute_block(source, sink)
+    }
+
+    /// Executes the block as it is.
+    fn execute_block(
+        &mut self,
+        source: &mut dyn LineSource,
+        sink: &mut dyn CanonSink,
+    ) -> Result<Status, Error> {
+        let framed = self.phase == Phase::Running { framed: true };
         let mut out = Out { sink, span: self.block.span(), queue: &mut self.queue };
         self.executing = true;
         let status = self.state.execute(&mut self.block, &self.line, &mut out)?;
@@ -515,7 +535,7 @@ impl Interpreter {
             self.state.restore(&saved, span, &mut Out { sink, span, queue: &mut self.queue })?;
         }
         self.end_profile(sink)?;
-        Ok(Status::Running)
+        self.end_remapped(source, sink)
     }
 
     #[cfg(feature = "alloc")]

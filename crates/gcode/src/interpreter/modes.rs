@@ -38,7 +38,7 @@ impl State {
     pub(crate) fn spindle_mode(&mut self, block: &Block, out: &mut Out<'_>) -> Result<(), Error> {
         match block.g(GGroup::Spindle) {
             Some(G96) => {
-                if !block.has(b'S') {
+                if !block.has(b'S') && !block.speed_follows {
                     return Err(block.g_error(GGroup::Spindle, ErrorKind::SpindleMissingS));
                 }
                 let limit = block.get(b'D').map_or(1e30, f64::abs);

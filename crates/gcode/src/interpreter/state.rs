@@ -45,6 +45,10 @@ pub(crate) struct State {
     pub(crate) spindle_pocket: Option<i32>,
     /// Open calls.
     pub(crate) call_level: u32,
+    /// Remapped codes being executed in each other.
+    pub(crate) remap_level: u32,
+    #[cfg(feature = "alloc")]
+    pub(crate) remaps: crate::remap::Remaps,
     /// What the last return gave; `None` = nothing.
     pub(crate) return_value: Option<f64>,
     /// Undefined named parameters read 0 (LinuxCNC, while it passes over a definition).
@@ -79,6 +83,9 @@ impl State {
             loaded_slot: i32::from(settings.imitates_rs274),
             spindle_pocket: None,
             call_level: 0,
+            remap_level: 0,
+            #[cfg(feature = "alloc")]
+            remaps: crate::remap::Remaps::default(),
             return_value: None,
             unknown_names_are_zero: false,
             source_line: 0,
@@ -175,8 +182,12 @@ impl State {
         Canon::SetG92Offset(Position::from_array(self.g92))
     }
 
-    pub(crate) fn reader(&self) -> Reader {
+    pub(crate) fn reader(&self) -> Reader<'_> {
         Reader {
+            #[cfg(feature = "alloc")]
+            remaps: &self.remaps,
+            #[cfg(not(feature = "alloc"))]
+            remaps: core::marker::PhantomData,
             axes: self.settings.axes,
             diameter: self.modal.diameter,
             spindles: self.settings.spindles.min(8),
@@ -286,7 +297,8 @@ impl State {
             b"_current_pocket" => Some(self.pocket_of(self.loaded_slot)),
             b"_selected_tool" => Some(modal.selected_tool.into()),
             b"_selected_pocket" => Some(self.pocket_of(modal.selected_slot)),
-            b"_task" | b"_remap_level" => Some(0.0),
+            b"_task" => Some(0.0),
+            b"_remap_level" => Some(self.remap_level.into()),
             b"_call_level" => Some(self.call_level.into()),
             b"_value" => Some(self.return_value.unwrap_or(0.0)),
             b"_value_returned" => flag(self.return_value.is_some()),

@@ -61,7 +61,7 @@ impl State {
                 }
                 Ok(true)
             }
-            Some(number) => {
+            Some(number @ 61) => {
                 let Some(q) = block.get(b'Q') else {
                     let kind = ErrorKind::WordMissingM { letter: 'Q', number };
                     return Err(block.m_error(MGroup::Tool, kind));
@@ -85,7 +85,7 @@ impl State {
                 }
                 Ok(true)
             }
-            None => Ok(false),
+            _ => Ok(false),
         }
     }
 

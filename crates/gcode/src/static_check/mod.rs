@@ -251,6 +251,7 @@ impl<'a> StaticCheck<'a> {
             self.quirks();
         }
         let reader = crate::block::Reader {
+            remaps: &crate::remap::NO_REMAPS,
             axes: self.axes_here(),
             diameter: false,
             spindles: self.settings.spindles.min(8),

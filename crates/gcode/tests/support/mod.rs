@@ -75,11 +75,20 @@ fn interpret(
     tools: &[u8],
     variables: Option<&str>,
 ) -> Outcome {
+    interpret_by(Interpreter::new(settings), source, tools, variables)
+}
+
+/// What an interpreter that is ready to begin makes of a program.
+pub fn interpret_by(
+    mut interpreter: Interpreter,
+    source: &mut dyn LineSource,
+    tools: &[u8],
+    variables: Option<&str>,
+) -> Outcome {
     let tools = ToolTable::parse(tools, |_, _| {}).expect("a small table");
     let mut output: Vec<u8> = Vec::new();
     let mut writer = TextWriter::new(|bytes: &[u8]| output.extend_from_slice(bytes), Spelling::V2_9);
     let (mut failed_block, mut message) = (None, String::new());
-    let mut interpreter = Interpreter::new(settings);
     *interpreter.tools_mut() = tools;
     let file = variables.map(|text| {
         ParameterFile::read(text.as_bytes(), interpreter.parameters_mut()).expect("a parameter file")

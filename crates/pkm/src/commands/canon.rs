@@ -63,6 +63,9 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
         }
         Program::Memory { text, .. } => Box::new(MemorySource::new(text)),
     };
+    if let Some(ini) = &ini {
+        ini.remap(&settings, &mut interpreter, source.as_mut())?;
+    }
     let mut failed = false;
     let report = |diagnostic: &Diagnostic, line: &[u8]| {
         failed = true;

@@ -1,7 +1,7 @@
 //! The settings of the interpreter from LinuxCNC's INI file, with the meaning they have for `rs274 -i`.
 
 use crate::outcome::Failure;
-use pkm_gcode::Settings;
+use pkm_gcode::{Interpreter, LineSource, Remap, Settings};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -60,9 +60,6 @@ impl Ini {
     /// A value that is none, or a setting that pkm does not have and without which programs would mean something else.
     pub(crate) fn apply(&self, settings: &mut Settings) -> Result<(), Failure> {
         const NGC: &str = "RS274NGC";
-        if self.entries.get(NGC, "REMAP").is_some() {
-            return Err(self.refuse(NGC, "REMAP", "take it out: pkm has no remapped codes"));
-        }
         settings.random_toolchanger = self.flag("EMCIO", "RANDOM_TOOLCHANGER")?;
         for (axis, section) in ["AXIS_A", "AXIS_B", "AXIS_C"].into_iter().enumerate() {
             settings.wrapped_rotary[axis] = self.flag(section, "WRAPPED_ROTARY")?;
@@ -92,6 +89,33 @@ impl Ini {
                 Ok(count @ 1..=8) => count,
                 _ => return Err(self.refuse("TRAJ", "SPINDLES", "write 1 to 8")),
             };
+        }
+        Ok(())
+    }
+
+    /// The remapped codes.
+    ///
+    /// # Errors
+    /// One that pkm cannot do, one that stands there twice, or one whose sub has no file.
+    pub(crate) fn remap(
+        &self,
+        settings: &Settings,
+        interpreter: &mut Interpreter,
+        source: &mut dyn LineSource,
+    ) -> Result<(), Failure> {
+        for text in self.entries.all("RS274NGC", "REMAP") {
+            let refuse = |message: String, help: &str| {
+                let message = format!("[RS274NGC]REMAP = {text}: {message}");
+                Failure::could_not("ini-file", &self.path.display().to_string(), message, help)
+            };
+            let remap = Remap::parse(text, settings).map_err(|error| refuse(error.message, error.help))?;
+            if !matches!(source.find_subroutine(remap.sub()), Ok(Some(_))) {
+                let help = "put it beside the program or into a folder of PROGRAM_PREFIX or SUBROUTINE_PATH";
+                return Err(refuse(format!("there is no file {}.ngc", remap.sub()), help));
+            }
+            if !interpreter.add_remap(remap) {
+                return Err(refuse("this code is remapped already".to_owned(), "remove one of the lines"));
+            }
         }
         Ok(())
     }
@@ -152,7 +176,6 @@ mod tests {
             ("[TRAJ]\nSPINDLES = 9\n", "[TRAJ]SPINDLES = 9"),
             ("[RS274NGC]\n\nORIENT_OFFSET = ten\n", "[RS274NGC]ORIENT_OFFSET = ten"),
             ("[EMCIO]\nTOOL_CHANGE_AT_G30 = perhaps\n", "[EMCIO]TOOL_CHANGE_AT_G30"),
-            ("[RS274NGC]\nREMAP = M6 ngc=change\n", "[RS274NGC]REMAP"),
         ] {
             let Err(Failure::CouldNot(diagnostics)) = ini(text).apply(&mut Settings::rs274()) else {
                 panic!("{text:?} is accepted");

@@ -290,6 +290,25 @@ impl Interpreter {
         Ok(self.flow.frames.len())
     }
 
+    /// Calls the sub of a remapped code, whose name is its label and its file's. The result of the sub before stays (checked with rs274 2.9).
+    pub(in crate::interpreter) fn enter_remap(
+        &mut self,
+        sub: &str,
+        span: Span,
+        arguments: [f64; ARGUMENTS],
+        count: usize,
+        source: &mut dyn LineSource,
+    ) -> Result<(), Error> {
+        self.flow.text.clear();
+        let _ = self.flow.text.extend_from_slice(sub.as_bytes());
+        let label = self.flow.label();
+        self.enter(label, Style::OWord, span, 1, Some(arguments), source)?;
+        if self.state.settings.oword_nargs {
+            let _ = self.state.parameters.set_named(b"n_args", count as f64);
+        }
+        Ok(())
+    }
+
     /// The o-word just executed is no part of what follows.
     pub(in crate::interpreter) fn forget_o_word(&mut self) {
         self.flow.current = None;
