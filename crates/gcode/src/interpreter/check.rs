@@ -18,15 +18,17 @@ impl State {
         block.motion = self.motion_of(block)?;
         self.check_polar(block)?;
         check_g_codes(block, self)?;
-        #[cfg(feature = "alloc")]
-        if self.has_remapped_code(block) {
-            return self.check_remapped(block);
+        let remapped = self.without_remapped(block)?;
+        match &remapped {
+            // LinuxCNC looks no further.
+            Some(_) if self.settings.dialect != Dialect::Pkm => return Ok(()),
+            Some(_) => {}
+            None => check_m_codes(block, self.settings.dialect)?,
         }
-        check_m_codes(block, self.settings.dialect)?;
         if self.splines.is_open() && self.settings.dialect == Dialect::Pkm {
             self.check_open_spline(block)?;
         }
-        self.check_words(block)
+        self.check_words(remapped.as_ref().map_or(block, |rest| rest))
     }
 
     /// LinuxCNC looks at the plane in force before the block, whatever the block selects (checked with rs274 2.9); pkm at the
@@ -37,6 +39,21 @@ impl State {
             return Err(block.word_error(letter, ErrorKind::PolarPlane));
         }
         Ok(())
+    }
+
+    /// A block that holds a remapped code, without the words that its sub gets.
+    #[cfg(feature = "alloc")]
+    #[inline]
+    fn without_remapped(&self, block: &Block) -> Result<Option<alloc::boxed::Box<Block>>, Error> {
+        match self.remaps.is_empty() || !self.has_remapped_code(block) {
+            true => Ok(None),
+            false => self.rest_of_remapped(block).map(Some),
+        }
+    }
+
+    #[cfg(not(feature = "alloc"))]
+    fn without_remapped(&self, _: &Block) -> Result<Option<&'static Block>, Error> {
+        Ok(None)
     }
 
     /// True for a G code that RS274 does not know and a sub stands for.
@@ -98,7 +115,7 @@ impl State {
     }
 
     /// Dialect section 8: a word nobody uses is an error.
-    pub(super) fn check_words(&self, block: &Block) -> Result<(), Error> {
+    fn check_words(&self, block: &Block) -> Result<(), Error> {
         let motion = block.motion.unwrap_or(G80);
         let newer = self.settings.dialect != Dialect::LinuxCnc29;
         let g0 = block.g(GGroup::NonModal);

@@ -487,13 +487,14 @@ impl Interpreter {
             return Ok(Status::Running);
         }
         #[cfg(feature = "alloc")]
-        if self.holds_remap() {
+        if !self.state.remaps.is_empty() && self.holds_remap() {
             return self.begin_remapped(source, sink);
         }
         self.execute_block(source, sink)
     }
 
     /// Executes the block as it is.
+    #[inline(always)]
     fn execute_block(
         &mut self,
         source: &mut dyn LineSource,

@@ -58,7 +58,7 @@ impl Interpreter {
 
     /// True if the block just read holds a remapped code.
     pub(super) fn holds_remap(&self) -> bool {
-        !self.state.remaps.is_empty() && self.remap_of(&self.block, 0).is_some()
+        self.remap_of(&self.block, 0).is_some()
     }
 
     /// Executes the block just read up to its first remapped code, whose sub begins.
@@ -215,18 +215,12 @@ impl State {
             Remapped::Word(_) => false,
             code => self.step_of(code, block).is_some(),
         };
-        !self.remaps.is_empty() && self.remaps.iter().any(has)
+        self.remaps.iter().any(has)
     }
 
-    /// The words of such a block: in pkm each has a use; LinuxCNC does not look.
-    pub(super) fn check_remapped(&self, block: &Block) -> Result<(), Error> {
-        if self.settings.dialect != Dialect::Pkm {
-            return Ok(());
-        }
-        if self.splines.is_open() {
-            self.check_open_spline(block)?;
-        }
-        let mut rest = block.clone();
+    /// Such a block without the words that the subs get; in pkm every other one has a use.
+    pub(super) fn rest_of_remapped(&self, block: &Block) -> Result<Box<Block>, Error> {
+        let mut rest = Box::new(block.clone());
         let mut moves = false;
         for (_, remap) in self.remaps.iter().filter(|(_, remap)| self.step_of(remap.code, block).is_some()) {
             moves |= matches!(remap.code, Remapped::G(_));
@@ -234,10 +228,11 @@ impl State {
                 rest.set(letter.to_ascii_uppercase(), None);
             }
         }
-        if let Some(letter) = AXIS_LETTERS.iter().copied().find(|letter| moves && rest.has(*letter)) {
+        let unused = AXIS_LETTERS.iter().copied().find(|letter| moves && rest.has(*letter));
+        if let Some(letter) = unused.filter(|_| self.settings.dialect == Dialect::Pkm) {
             let users = "motion codes and remapped codes whose argspec names it";
             return Err(block.word_error(letter, ErrorKind::WordUnused { letter: letter.into(), users }));
         }
-        self.check_words(&rest)
+        Ok(rest)
     }
 }
