@@ -259,7 +259,14 @@ fn exists<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, f64> {
 
 fn call(function: Function, x: f64) -> Result<f64, ErrorKind> {
     Ok(match function {
-        Function::Abs => x.abs(),
+        // -0 stays -0: ATAN tells it from 0 (checked with rs274 2.9).
+        Function::Abs => {
+            if x < 0.0 {
+                -x
+            } else {
+                x
+            }
+        }
         Function::Acos if !(-1.0..=1.0).contains(&x) => return Err(ErrorKind::MathAcos { value: x }),
         Function::Acos => functions::acos(x),
         Function::Asin if !(-1.0..=1.0).contains(&x) => return Err(ErrorKind::MathAsin { value: x }),

@@ -9,9 +9,9 @@ use pkm_kins::maths;
 #[derive(Clone, Copy)]
 struct Pair(f64, f64);
 
-/// Sine of an angle in degrees.
+/// Sine of an angle in degrees. A zero keeps its sign here and below: ATAN tells -0 from 0.
 pub(crate) fn sin(x: f64) -> f64 {
-    sin_cos(radians(x)).0.nearest()
+    if x == 0.0 { x } else { sin_cos(radians(x)).0.nearest() }
 }
 
 /// Cosine of an angle in degrees.
@@ -23,7 +23,7 @@ pub(crate) fn cos(x: f64) -> f64 {
 pub(crate) fn tan(x: f64) -> f64 {
     let (sin, cos) = sin_cos(radians(x));
     let near = sin.0 / cos.0;
-    near + sin.less(cos.times(near)).nearest() / cos.0
+    if x == 0.0 { x } else { near + sin.less(cos.times(near)).nearest() / cos.0 }
 }
 
 /// Angle of the direction (x, y) in degrees.
@@ -31,14 +31,15 @@ pub(crate) fn atan2(y: f64, x: f64) -> f64 {
     let near = maths::atan2(y, x);
     let (sin, cos) = sin_cos(Pair(near, 0.0));
     let off = cos.times(y).less(sin.times(x)).nearest() / (cos.0 * x + sin.0 * y);
-    degrees(if off.is_finite() { near + off } else { near })
+    degrees(if off.is_finite() && near != 0.0 { near + off } else { near })
 }
 
 /// Angle in degrees whose sine is x, |x| ≤ 1.
 pub(crate) fn asin(x: f64) -> f64 {
     let near = maths::asin(x);
     let (sin, cos) = sin_cos(Pair(near, 0.0));
-    degrees(if x.abs() < 1.0 { near + Pair(x, 0.0).less(sin).nearest() / cos.0 } else { near })
+    let inside = x != 0.0 && x.abs() < 1.0;
+    degrees(if inside { near + Pair(x, 0.0).less(sin).nearest() / cos.0 } else { near })
 }
 
 /// Angle in degrees whose cosine is x, |x| ≤ 1.
@@ -283,6 +284,8 @@ mod tests {
         assert_eq!((atan2(1.0, 1.0), atan2(0.0, -1.0), atan2(-2.0, 0.0)), (45.0, 180.0, -90.0));
         assert_eq!((atan2(0.0, 0.0), sin(0.0), tan(0.0), cos(0.0)), (0.0, 0.0, 0.0, 1.0));
         assert_eq!(sin(1e300), maths::sin(1e300 * maths::PI / 180.0));
+        let zeros = [sin(-0.0), tan(-0.0), asin(-0.0), atan2(-0.0, 1.0)];
+        assert!(zeros.iter().all(|zero| *zero == 0.0 && zero.is_sign_negative()), "{zeros:?}");
     }
 
     #[test]
