@@ -155,7 +155,12 @@ impl<const R: usize> Grid<R> {
     }
 
     /// The share of its planned entry at which node `index` may be passed now.
+    #[inline]
     pub(crate) fn share(&self, index: usize, now: Panel) -> f64 {
+        // As a rule all was planned with what is set.
+        if self.current == now && self.fresh == self.planned && self.pass.is_none() {
+            return 1.0;
+        }
         let planned = match self.pass {
             Some(pass) if pass.anew && (pass.next..pass.end).contains(&index) => pass.panel,
             _ if index < self.fresh || self.fresh == self.planned => self.current,
