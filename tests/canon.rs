@@ -88,6 +88,57 @@ fn settings_and_files() {
 }
 
 #[test]
+fn remapped_codes_come_from_the_ini_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        write(&path, text);
+        path.display().to_string()
+    };
+    std::fs::create_dir(folder.path().join("subs")).unwrap();
+    file(
+        "subs/change.ngc",
+        "o<change> sub\n(print,tool #<_selected_tool>)\nM6\nG0 Z#<p>\no<change> endsub\n",
+    );
+    let program = file("program.ngc", "T0 M400 P5\nG1 X1 F9 M400 P7\nM2\n");
+    let remap = |line: &str, program: &str| {
+        let ini = file("machine.ini", &format!("[RS274NGC]\nSUBROUTINE_PATH = subs\nREMAP = {line}\n"));
+        pkm(&["canon", program, "--ini", &ini])
+    };
+    let run = remap("M400 modalgroup=6 argspec=P ngc=change # comment", &program);
+    assert_eq!(run.status, 0, "{}", run.stderr);
+    let order = [
+        "SELECT_TOOL(0)",
+        "tool 0.000000",
+        "CHANGE_TOOL(0)",
+        "0.0000, 5.0000",
+        "SET_FEED_RATE(9.0000)",
+        "tool 0.0",
+        "0.0000, 7.0000",
+        "STRAIGHT_FEED(1.0000",
+    ];
+    let mut rest = run.stdout.as_str();
+    for text in order {
+        rest = rest.split_once(text).unwrap_or_else(|| panic!("{text}: {}", run.stdout)).1;
+    }
+    let bad = file("bad.ngc", "G0 X1\nM400 Q5\nM2\n");
+    let run = remap("M400 modalgroup=6 argspec=P ngc=change", &bad);
+    assert_eq!(run.status, 1);
+    assert!(run.stderr.contains(":2:1: error[word-missing]: the remapped code needs P"), "{}", run.stderr);
+    for (line, said) in [
+        ("M400 python=change", "python=change needs Python"),
+        ("M400 ngc=change prolog=before", "prolog=before needs Python"),
+        ("M400 ngc=nothing", "there is no file nothing.ngc"),
+        ("M3 ngc=change", "M3 cannot be remapped"),
+        ("M400 ngc=change\nREMAP = m400 ngc=change", "this code is remapped already"),
+    ] {
+        let run = remap(line, &program);
+        assert_eq!(run.status, 2, "{line}");
+        assert!(run.stderr.contains(said) && run.stderr.contains("help"), "{line}: {}", run.stderr);
+    }
+}
+
+#[test]
 fn a_closed_pipe_ends_an_endless_program() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("endless.ngc");

@@ -39,6 +39,9 @@ fn refuse<T>(message: String, help: &'static str) -> Result<T, RemapError> {
     Err(RemapError { message, help })
 }
 
+/// A line has no room for a longer label.
+const LONGEST_NAME: usize = 240;
+
 /// What stands before `=`.
 const KEYS: [&str; 6] = ["modalgroup", "argspec", "prolog", "epilog", "ngc", "python"];
 
@@ -90,6 +93,12 @@ impl Remap {
                 "name the sub, which is in a file of that name: ngc=NAME",
             );
         };
+        if sub.len() > LONGEST_NAME {
+            return refuse(
+                format!("the name of the sub is longer than {LONGEST_NAME} bytes"),
+                "choose a shorter one",
+            );
+        }
         let code = code_of(code, group, settings)?;
         Ok(Self { code, sub: sub.to_ascii_lowercase().into(), arguments: arguments.into() })
     }

@@ -171,6 +171,7 @@ impl Interpreter {
             }
             ErrorKind::ONotFound if self.return_from_search(source) => {
                 self.recovery.calls.push(error.span);
+                self.forget_remapped();
                 return;
             }
             _ => {}

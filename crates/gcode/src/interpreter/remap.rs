@@ -85,6 +85,13 @@ impl Interpreter {
         self.go_on_remapped(held.block, held.next, source, sink)
     }
 
+    /// Blocks whose sub was not found do not go on.
+    pub(super) fn forget_remapped(&mut self) {
+        let depth = self.flow.depth();
+        self.remapping.held.retain(|held| held.depth < depth);
+        self.state.remap_level = self.remapping.held.len() as u32;
+    }
+
     fn go_on_remapped(
         &mut self,
         mut block: Box<Block>,

@@ -110,7 +110,8 @@ impl Ini {
             };
             let remap = Remap::parse(text, settings).map_err(|error| refuse(error.message, error.help))?;
             if !matches!(source.find_subroutine(remap.sub()), Ok(Some(_))) {
-                let help = "put it beside the program or into a folder of PROGRAM_PREFIX or SUBROUTINE_PATH";
+                let help =
+                    "put it beside the program file or into a folder of PROGRAM_PREFIX or SUBROUTINE_PATH";
                 return Err(refuse(format!("there is no file {}.ngc", remap.sub()), help));
             }
             if !interpreter.add_remap(remap) {
