@@ -59,6 +59,9 @@ pub(crate) fn bracketed<'a>(input: Rest<'a>, scope: &impl Scope) -> Read<'a, f64
 }
 
 fn integer_at<'a>(input: Rest<'a>, scope: &impl Scope, depth: u8) -> Read<'a, i32> {
+    if let Some(plain) = lexer::plain_integer(input) {
+        return Ok(plain);
+    }
     let (rest, value) = signed_value(input, scope, depth)?;
     if value.is_nan() {
         return Ok((rest, UNKNOWN));

@@ -81,6 +81,13 @@ pub(crate) fn number(input: Rest<'_>) -> Read<'_, f64> {
     Ok((rest, number))
 }
 
+/// Up to nine digits with no point behind them: what labels and parameter numbers mostly are.
+pub(crate) fn plain_integer(input: Rest<'_>) -> Option<(Rest<'_>, i32)> {
+    let (rest, number) = digits(input, 0);
+    let count = input.len() - rest.len();
+    ((1..=9).contains(&count) && rest.first() != Some(&b'.')).then_some((rest, number as i32))
+}
+
 /// Appends the digits that the input begins with to a number; it wraps around from 20 digits on.
 #[inline]
 fn digits(mut input: Rest<'_>, mut number: u64) -> (Rest<'_>, u64) {
