@@ -173,6 +173,8 @@ fn what_is_wrong_with_a_spline_is_named() {
     // The word of the third axis is refused by pkm; LinuxCNC 2.10 passes over it.
     assert_eq!(run(Dialect::Pkm, "F100|G17 G5.1 X1 Y1 Z1 I1 J1|M2").1, ["spline-words"]);
     assert_eq!(run(Dialect::LinuxCnc210, "F100|G17 G5.1 X1 Y1 Z1 I1 J1|M2").2[..3], [1.0, 1.0, 0.0]);
+    assert_eq!(run(Dialect::Pkm, "%|F100|G5.2 X1 Y1 P1|%").1, ["nurbs-points"]);
+    assert!(run(Dialect::LinuxCnc210, "%|F100|G5.2 X1 Y1 P1|%").1.is_empty());
     for rest in ["G18", "G20", "G55", "G52 X1", "G0 X1", "M2"] {
         let program = format!("F100|G6.2 P2 Q1 X0 Y0 K0 R1|{rest}|M2");
         assert_eq!(run(Dialect::Pkm, &program).1[0], "nurbs-points", "{rest}");

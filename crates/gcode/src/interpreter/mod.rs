@@ -444,6 +444,7 @@ impl Interpreter {
                 if let Some(error) = self.flow.unclosed() {
                     return Err(error);
                 }
+                self.state.check_spline_ended(self.line.whole())?;
                 return Ok(Status::Ended);
             }
             [b'/', ..] if self.state.settings.block_delete => return Ok(Status::Running),

@@ -8,7 +8,7 @@ use crate::error::{Code, Error, ErrorKind};
 use crate::modal::*;
 use crate::settings::Dialect;
 use heapless::Vec;
-use pkm_canon::{Canon, ControlPoint, Plane};
+use pkm_canon::{Canon, ControlPoint, Plane, Span};
 
 /// Most control points of one NURBS; of G6.2 the last blocks, which hold knots alone, count too.
 #[cfg(feature = "alloc")]
@@ -372,6 +372,15 @@ impl State {
             return Err(block.word_error(b'K', ErrorKind::NurbsKnot { value: knot }));
         }
         Ok(())
+    }
+
+    /// The end of the program drops no control points (pkm).
+    pub(crate) fn check_spline_ended(&self, span: Span) -> Result<(), Error> {
+        if self.settings.dialect != Dialect::Pkm || !self.splines.is_open() {
+            return Ok(());
+        }
+        let (points, order) = (self.splines.points.len() as u16, self.splines.order as u16);
+        Err(Error { kind: ErrorKind::NurbsPoints { points, order }, span })
     }
 
     /// Between its control points a NURBS keeps its plane, units and offsets (pkm).
