@@ -3,7 +3,8 @@
 
 mod support;
 
-use pkm_gcode::{Dialect, FileSource, Interpreter, Remap, Settings};
+use pkm_canon::{Canon, CanonSink, Span};
+use pkm_gcode::{Dialect, FileSource, Interpreter, Remap, Settings, Status};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use support::{Outcome, difference, has_rs274};
@@ -215,4 +216,64 @@ fn pkm_refuses_words_that_nobody_uses() {
         );
     }
     let _ = std::fs::remove_dir_all(&directory);
+}
+
+struct Nothing;
+
+impl CanonSink for Nothing {
+    fn command(&mut self, _: &Canon<'_>, _: Span) {}
+}
+
+/// Spoiled programs, gone on with after every error, end without a panic in every dialect.
+#[test]
+fn spoiled_programs_end() {
+    let directory = scratch("spoiled");
+    let mut state = 1_u64;
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below
+    };
+    let mut errors = 0;
+    for round in 0..300 {
+        let mut text: Vec<u8> = b"F100 S50\n".to_vec();
+        for _ in 0..20 {
+            for words in WORDS {
+                if random(3) == 0 {
+                    text.extend_from_slice(words[random(words.len())].as_bytes());
+                }
+            }
+            let more =
+                ["\n", "\no7 if [0]\n", "\no7 endif\n", "\nM98 P5\n", "\no<m400sub> call [1]\n", "\nM405\n"];
+            text.extend_from_slice(more[if random(4) > 0 { 0 } else { random(more.len()) }].as_bytes());
+        }
+        text.extend_from_slice(b"M2\n");
+        for _ in 0..random(12) {
+            let at = random(text.len());
+            text[at] = b" \nOMGPXF[]#<>1.%"[random(16)];
+        }
+        let dialect = [Dialect::LinuxCnc29, Dialect::LinuxCnc210, Dialect::Pkm][round % 3];
+        let settings =
+            Settings { dialect, max_blocks: 20_000, max_idle_blocks: 20_000, ..Settings::default() };
+        let path = directory.join("program.ngc");
+        support::write(&path, &text);
+        let mut source = FileSource::open(&path, vec![directory.clone()]).expect("a program");
+        let mut interpreter = Interpreter::new(settings);
+        for (code, options, _) in REMAPS {
+            let remap =
+                Remap::parse(&format!("{code} {options} ngc={}", name(code)), &settings).expect("a remap");
+            assert!(interpreter.add_remap(remap));
+        }
+        let mut steps = 0;
+        loop {
+            match interpreter.step(&mut source, &mut Nothing) {
+                Ok(Status::Ended) => break,
+                Ok(_) => {}
+                Err(_) => errors += 1,
+            }
+            steps += 1;
+            assert!(steps < 100_000, "round {round} does not end: {}", String::from_utf8_lossy(&text));
+        }
+    }
+    let _ = std::fs::remove_dir_all(&directory);
+    assert!(errors > 300, "only {errors} errors: nothing was spoiled");
 }
