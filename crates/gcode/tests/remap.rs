@@ -57,16 +57,21 @@ fn ini() -> String {
     })
 }
 
-fn pkm(settings: Settings, directory: &Path) -> Outcome {
-    let mut source =
-        FileSource::open(&directory.join("program.ngc"), vec![directory.to_path_buf()]).expect("a program");
+/// An interpreter with the remapped codes.
+fn interpreter(settings: Settings) -> Interpreter {
     let mut interpreter = Interpreter::new(settings);
     for (code, options, _) in REMAPS {
         let remap =
             Remap::parse(&format!("{code} {options} ngc={}", name(code)), &settings).expect("a remap");
         assert!(interpreter.add_remap(remap));
     }
-    support::interpret_by(interpreter, &mut source, support::TOOLS.as_bytes(), None)
+    interpreter
+}
+
+fn pkm(settings: Settings, directory: &Path) -> Outcome {
+    let mut source =
+        FileSource::open(&directory.join("program.ngc"), vec![directory.to_path_buf()]).expect("a program");
+    support::interpret_by(interpreter(settings), &mut source, support::TOOLS.as_bytes(), None)
 }
 
 fn compare(program: &str, directory: &Path) -> Option<Option<String>> {
@@ -257,12 +262,7 @@ fn spoiled_programs_end() {
         let path = directory.join("program.ngc");
         support::write(&path, &text);
         let mut source = FileSource::open(&path, vec![directory.clone()]).expect("a program");
-        let mut interpreter = Interpreter::new(settings);
-        for (code, options, _) in REMAPS {
-            let remap =
-                Remap::parse(&format!("{code} {options} ngc={}", name(code)), &settings).expect("a remap");
-            assert!(interpreter.add_remap(remap));
-        }
+        let mut interpreter = interpreter(settings);
         let mut steps = 0;
         loop {
             match interpreter.step(&mut source, &mut Nothing) {
