@@ -333,8 +333,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 // At rest with one interval known and more to come.
                 return false;
             }
-            // A stop to the left does not cap what is in between.
-            let cap = node.speed_cap(panel).min(next.speed_cap(panel));
+            let cap = node.cap_until(next, panel);
             // A peak in between gains something only where the exit is held down by what follows, not by the strips,
             // and where the interval takes more than a quarter of a period.
             let brief = self.is_brief(length, x.min(x_end));
@@ -422,7 +421,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             motion: piece.motion,
             s,
             blending: piece.corner,
-            feed_use: piece.feed.share(&point.first, speed),
+            feed_use: piece.feed_use(&point.first, speed),
             span: piece.span,
             state,
             starved: self.starved,

@@ -40,10 +40,11 @@ pub(crate) struct Node<const R: usize> {
     pub(crate) length: f64,
     /// Largest x from which the machine can follow the path.
     pub(crate) entry: f64,
-    /// Caps on x: velocity limits, feed at 100 %.
-    hard: f64,
-    feed: f64,
-    rapid: bool,
+    /// Caps on x here, and what of them holds in the interval to the left and in the one to the right: where two pieces meet, the
+    /// slower one holds the other no further than here.
+    at: Caps,
+    before: Caps,
+    after: Caps,
     /// The machine rests here.
     pub(crate) stop: bool,
     /// And for so long.
@@ -57,16 +58,39 @@ pub(crate) struct Node<const R: usize> {
     pub(crate) distance: f64,
 }
 
+/// Caps on x: velocity limits, feed at 100 %.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Caps {
+    hard: f64,
+    feed: f64,
+    rapid: bool,
+}
+
+impl Caps {
+    /// With what the operator has set.
+    fn under(&self, panel: Panel) -> f64 {
+        let hard = if self.rapid { self.hard * panel.rapid * panel.rapid } else { self.hard };
+        lower(hard, self.feed * panel.feed * panel.feed)
+    }
+
+    fn lower(self, other: Self) -> Self {
+        Self {
+            hard: lower(self.hard, other.hard),
+            feed: lower(self.feed, other.feed),
+            rapid: self.rapid || other.rapid,
+        }
+    }
+}
+
 impl<const R: usize> Node<R> {
     /// Cap on x with what the operator has set.
     pub(crate) fn cap(&self, panel: Panel) -> f64 {
-        if self.stop || panel.single_block && self.blocks > 0 { 0.0 } else { self.speed_cap(panel) }
+        if self.stop || panel.single_block && self.blocks > 0 { 0.0 } else { self.at.under(panel) }
     }
 
-    /// The same without regard to a stop.
-    pub(crate) fn speed_cap(&self, panel: Panel) -> f64 {
-        let hard = if self.rapid { self.hard * panel.rapid * panel.rapid } else { self.hard };
-        lower(hard, self.feed * panel.feed * panel.feed)
+    /// Cap on x between this node and the next.
+    pub(crate) fn cap_until(&self, next: &Self, panel: Panel) -> f64 {
+        lower(self.after.under(panel), next.before.under(panel))
     }
 }
 
@@ -75,7 +99,10 @@ impl<const R: usize> Node<R> {
 pub(crate) struct Grid<const R: usize> {
     pub(crate) piece: u64,
     pub(crate) s: f64,
+    /// What is guessed to be right for the next interval, and for the one after it: so the processor need not know how good a
+    /// step was before it begins the next.
     step: f64,
+    after_step: f64,
     /// At the last node, and at the place that may become the next; the first of them is that of the last node if `swapped` is false.
     samples: [Sample<R>; 2],
     swapped: bool,
@@ -119,6 +146,7 @@ impl<const R: usize> Grid<R> {
             piece: 0,
             s: 0.0,
             step: f64::INFINITY,
+            after_step: f64::INFINITY,
             samples: [Sample::EMPTY; 2],
             swapped: false,
             planned: 0,
@@ -216,14 +244,15 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let number = self.grid.piece;
         let (sample, _) = self.grid.samples();
         self.limits.sample(&self.kinematics, piece, piece.from, sample)?;
+        let caps = Caps { hard: sample.hard, feed: sample.feed, rapid: piece.rapid };
         let node = Node {
             piece: number,
             s: piece.from,
             length: 0.0,
             entry: 0.0,
-            hard: sample.hard,
-            feed: sample.feed,
-            rapid: piece.rapid,
+            at: caps,
+            before: caps,
+            after: caps,
             stop: true,
             dwell_ns: piece.dwell_ns,
             blocks: 1,
@@ -233,6 +262,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         };
         self.grid.s = node.s;
         self.grid.step = f64::INFINITY;
+        self.grid.after_step = f64::INFINITY;
         self.work.samples += 1;
         self.add(node);
         Ok(())
@@ -266,9 +296,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             tail.right = sample.rows;
             tail.piece = number;
             tail.s = from;
-            tail.hard = tail.hard.min(sample.hard);
-            tail.feed = tail.feed.min(sample.feed);
-            tail.rapid |= rapid;
+            tail.after = Caps { hard: sample.hard, feed: sample.feed, rapid };
+            tail.at = tail.at.lower(tail.after);
             self.work.samples += 1;
         }
         self.grid.piece = number;
@@ -317,23 +346,28 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let s = if at_end { piece.to } else { start + step };
         let Some(tail) = self.nodes.back_mut() else { return Ok(()) };
         tail.length = step;
-        tail.hard = lower(tail.hard, between);
+        tail.at.hard = lower(tail.at.hard, between);
+        tail.after.hard = lower(tail.after.hard, between);
+        if start > piece.from {
+            tail.before = tail.after;
+        }
         let distance = tail.distance + step;
-        let mut hard = lower(sample.hard, between);
+        let mut hard = between;
         if let Some(earlier) = self.nodes.len().checked_sub(NODES_PER_TICK)
             && let Some(earlier) = self.nodes.get(earlier)
         {
             let speed = (distance - earlier.distance) / period;
             hard = lower(hard, speed * speed);
         }
+        let caps = Caps { hard, feed: sample.feed, rapid: piece.rapid };
         let node = Node {
             piece: number,
             s,
             length: 0.0,
             entry: 0.0,
-            hard,
-            feed: sample.feed,
-            rapid: piece.rapid,
+            at: caps,
+            before: caps,
+            after: caps,
             stop: false,
             dwell_ns: 0,
             blocks: 0,
@@ -343,7 +377,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         };
         self.add(node);
         self.grid.s = s;
-        self.grid.step = next_guess;
+        self.grid.step = self.grid.after_step;
+        self.grid.after_step = next_guess;
         self.grid.swapped = !self.grid.swapped;
         Ok(())
     }

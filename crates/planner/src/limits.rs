@@ -212,6 +212,9 @@ impl<const R: usize> Limits<R> {
             }
         }
         sample.feed = piece.feed.cap(&point.first);
+        if let Some(onto) = &piece.onto {
+            sample.feed = lower(sample.feed, onto.cap(&point.first));
+        }
         let (mut fastest, mut within) = (0.0, true);
         let mut set = |row: usize, q: f64, d1: f64, d2: f64| {
             let speed = d1 * self.per_velocity[row];

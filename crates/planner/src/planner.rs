@@ -122,6 +122,8 @@ pub(crate) struct Piece {
     pub(crate) from: f64,
     pub(crate) to: f64,
     pub(crate) feed: Feed,
+    /// A blend onto a move whose feed counts other coordinates: that feed, which holds too.
+    pub(crate) onto: Option<Feed>,
     pub(crate) rapid: bool,
     /// More of it will be released later.
     pub(crate) open: bool,
@@ -133,6 +135,14 @@ pub(crate) struct Piece {
     pub(crate) mode: PathMode,
     pub(crate) motion: u32,
     pub(crate) span: Span,
+}
+
+impl Piece {
+    /// The feed at ṡ = `speed`, as a share of what was asked for.
+    pub(crate) fn feed_use(&self, first: &Vector, speed: f64) -> f64 {
+        let share = |feed: &Feed| feed.share(first, speed);
+        share(&self.feed).max(self.onto.as_ref().map_or(0.0, share))
+    }
 }
 
 impl<K, const R: usize, const PIECES: usize, const NODES: usize> core::fmt::Debug
@@ -298,6 +308,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             from,
             to: (0.5 * length).max(from),
             feed: next.feed,
+            onto: None,
             rapid: next.rapid,
             open: true,
             stop: false,
@@ -325,6 +336,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             from: 0.0,
             to: 0.0,
             feed: Feed { speed: f64::INFINITY, group: FeedGroup::Xyz },
+            onto: None,
             rapid: false,
             open: false,
             stop: true,
@@ -388,12 +400,14 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             return 0.0;
         };
         last.to = length - cut;
-        let group = if last.feed.group == next.feed.group { next.feed.group } else { FeedGroup::Mixed };
+        let alike = last.feed.group == next.feed.group;
+        let speed = if alike { last.feed.speed.min(next.feed.speed) } else { last.feed.speed };
         let blend = Piece {
             geometry: Geometry::Blend(blend),
             from: 0.0,
             to: blend.length,
-            feed: Feed { speed: last.feed.speed.min(next.feed.speed), group },
+            feed: Feed { speed, ..last.feed },
+            onto: (!alike).then_some(next.feed),
             rapid: last.rapid && next.rapid,
             open: false,
             stop: false,

@@ -59,7 +59,7 @@ mod tests {
 
     fn line(planner: &Small, to: Pose) -> Move {
         let geometry = Geometry::Line(Line::new(*planner.end(), to.to_array()).unwrap());
-        let feed = Feed { speed: 50.0, group: FeedGroup::Mixed };
+        let feed = Feed { speed: 50.0, group: FeedGroup::Xyz };
         Move { geometry, feed, rapid: false, mode: PathMode::ExactStop, span: Span::default() }
     }
 

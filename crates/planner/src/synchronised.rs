@@ -527,6 +527,7 @@ fn pace<K: Kinematics, const R: usize>(
 ) -> Result<Pace, PlanError> {
     let feed = Feed { speed: f64::INFINITY, group: FeedGroup::Xyz };
     let piece = Piece {
+        onto: None,
         geometry: *geometry,
         from,
         to,

@@ -30,15 +30,14 @@ pub struct Point {
     pub second: Vector,
 }
 
-/// Which coordinates the feed counts, for one move. The rule is LinuxCNC's: XYZ if they move, else UVW, else ABC.
+/// Which coordinates the feed counts, for one move. The rule is LinuxCNC's: XYZ if they move, else UVW, else ABC. In a blend
+/// between moves of different groups each counts its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum FeedGroup {
     Xyz,
     Uvw,
     Abc,
-    /// A blend between moves of different groups: all lengths together.
-    Mixed,
 }
 
 /// The shape of one piece.
@@ -96,10 +95,6 @@ pub fn feed_length(v: &Vector, group: FeedGroup) -> f64 {
         FeedGroup::Xyz => norm3(v, 0),
         FeedGroup::Uvw => norm3(v, 6),
         FeedGroup::Abc => norm3(v, 3),
-        FeedGroup::Mixed => {
-            let (xyz, uvw) = (norm3(v, 0), norm3(v, 6));
-            sqrt(xyz * xyz + uvw * uvw)
-        }
     }
 }
 
