@@ -254,7 +254,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// True when a move can be pushed: there is room for it and for the nodes that a push may set.
     pub fn has_room(&self) -> bool {
-        self.pieces.len() + 2 <= PIECES && self.nodes.len() + SET_PER_PUSH.min(NODES / 4) <= NODES
+        self.pieces.len() + 3 <= PIECES && self.nodes.len() + SET_PER_PUSH.min(NODES / 4) <= NODES
     }
 
     /// Appends a move. Moves of no length are taken and dropped. Returns the move's number.
@@ -367,7 +367,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     }
 
     fn append(&mut self, piece: Piece) {
-        // `has_room` was checked by the caller: there is always room for a blend and a move.
+        // `has_room` was checked by the caller: there is always room for both halves of a blend and a move.
         let _ = self.pieces.push_back(piece);
     }
 
@@ -400,20 +400,21 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             return 0.0;
         };
         last.to = length - cut;
+        // Each feed holds on its own half; where they count different coordinates both hold throughout.
         let alike = last.feed.group == next.feed.group;
-        let speed = if alike { last.feed.speed.min(next.feed.speed) } else { last.feed.speed };
-        let blend = Piece {
+        let middle = if alike && last.feed != next.feed { 0.5 * blend.length } else { blend.length };
+        let first = Piece {
             geometry: Geometry::Blend(blend),
             from: 0.0,
-            to: blend.length,
-            feed: Feed { speed, ..last.feed },
+            to: middle,
             onto: (!alike).then_some(next.feed),
-            rapid: last.rapid && next.rapid,
+            rapid: last.rapid && (alike || next.rapid),
             open: false,
             stop: false,
             corner: true,
             ..*last
         };
+        let second = Piece { from: middle, to: blend.length, feed: next.feed, rapid: next.rapid, ..first };
         // Between short chords nothing of the line itself is left.
         let number = self.first_piece + self.pieces.len() as u64 - 1;
         if self.grid.piece < number
@@ -422,7 +423,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         {
             self.pieces.pop_back();
         }
-        self.append(blend);
+        self.append(first);
+        if second.from < second.to {
+            self.append(second);
+        }
         cut
     }
 

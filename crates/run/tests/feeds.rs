@@ -54,8 +54,10 @@ fn a_slow_move_does_not_hold_back_its_neighbours() {
     takes("G1 X100 F6000\nG1 X1 F60", fast_s + 1.0);
     takes("G1 X1 F60\nG1 X100 F6000", 1.0 + fast_s);
     takes("G0 X100\nG1 X1 F60", fast_s + 1.0);
-    // The corner is driven at the lower feed: a few hundredths of a millimetre more of it.
-    takes("G1 X100 F6000\nG1 Y1 F60", fast_s + 1.0 + 0.036);
+    takes("G1 X100 F6000\nG1 Y1 F60", fast_s + 1.0);
+    // A gentle corner is long: P allows it half of either line.
+    takes("G1 X10 F600\nG1 X10 Y0.005 F60", 1.0 + 10.0);
+    takes("G1 X10 F60\nG1 X10 Y0.005 F600", 10.0 + 1.0);
 }
 
 #[test]
