@@ -31,14 +31,23 @@ impl Observer for Speeds {
 /// Runs the moves on a Cartesian machine (100 mm/s, 1000 mm/s²; 90 degrees/s, 900 degrees/s²): duration in s, and the highest
 /// speeds in mm/s and degrees/s.
 fn driven(moves: &str) -> (f64, [f64; 2]) {
+    driven_in("G64 P0.02", moves)
+}
+
+/// The same in this path mode; no joint is over its limits.
+fn driven_in(mode: &str, moves: &str) -> (f64, [f64; 2]) {
     let machine = Machine::load("xyzabc", &[]).expect("a shipped machine");
-    let text = format!("G21 G91 G94 G64 P0.02\n{moves}\nM2\n").into_bytes();
+    let text = format!("G21 G91 G94 {mode}\n{moves}\nM2\n").into_bytes();
     let program = Program::Memory { name: "feeds".to_owned(), text };
     let looks_on = |_: &_| Speeds::default();
     let (summary, seen) =
         run(&program, &machine, &Options::default(), looks_on, |_| ControlFlow::Continue(()))
             .expect("readable");
     assert!(summary.completed, "{:?}", summary.diagnostics);
+    for joint in &summary.joints {
+        assert!(joint.peak_velocity <= joint.velocity_limit, "{mode}\n{moves}\n{joint:?}");
+        assert!(joint.peak_acceleration <= joint.acceleration_limit, "{mode}\n{moves}\n{joint:?}");
+    }
     (summary.duration_s, seen.expect("it ran").most.map(|by| by * 1000.0))
 }
 
@@ -71,4 +80,44 @@ fn from_a_line_to_a_turn_no_feed_is_exceeded_and_no_time_lost() {
     let (_, [mm_s, degrees_s]) = driven("F600\nG1 X2\nG1 A2\nG1 Y2\nG1 A-2\nG1 X-2");
     assert!(mm_s > 9.99 && mm_s < 10.000_1, "{mm_s}");
     assert!(degrees_s > 9.99 && degrees_s < 10.000_1, "{degrees_s}");
+}
+
+/// Moves of all sizes, along one axis or several, at feeds from 60 to 6000 a minute or as rapids.
+fn random_moves(seed: u64) -> String {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    let mut below = |n: u64| {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state % n) as usize
+    };
+    let mut places = [0.0_f64; 6];
+    let mut moves = String::from("F600");
+    for _ in 0..2 + below(20) {
+        moves.push_str(["\nG1", "\nG1", "\nG1", "\nG0"][below(4)]);
+        let rapid = moves.ends_with('0');
+        for (axis, place) in places.iter_mut().enumerate() {
+            if below(3) > 0 && axis != 0 {
+                continue;
+            }
+            let by = [0.01, 0.1, 1.0, 5.0, 20.0][below(5)] * [1.0, -1.0][below(2)];
+            let by = if (*place + by).abs() > 40.0 { -by } else { by };
+            *place += by;
+            moves.push_str(&format!(" {}{by}", char::from(b"XYZABC"[axis])));
+        }
+        if !rapid {
+            moves.push_str(&format!(" F{}", [60, 600, 3000, 6000][below(4)]));
+        }
+    }
+    moves
+}
+
+#[test]
+fn blending_is_not_slower_than_stopping() {
+    for seed in 0..30 {
+        let moves = random_moves(seed);
+        let stopping = driven_in("G61.1", &moves).0;
+        let blending = driven_in("G64 P0.02", &moves).0;
+        assert!(blending <= 1.05 * stopping, "seed {seed}: {blending} s, with stops {stopping} s\n{moves}");
+    }
 }
