@@ -406,7 +406,7 @@ impl Kinematics for Hexapod {
         Ok(jacobian)
     }
 
-    /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈, with d̈ = p̈ + ([α]× + [ω]×²) R a. Two struts at a time, the lengths with the operations of
+    /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈, with d̈ = p̈ + (`[α]× + [ω]×²`) R a. Two struts at a time, the lengths with the operations of
     /// `struts` in their order.
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
         Self::finite(pose)?;
