@@ -57,11 +57,11 @@ fn drive<K: Kinematics>(mechanism: K, joints: usize, centre: Pose, steps_per_mm:
         max_velocity: 1000.0,
         max_acceleration: 20_000.0,
     };
-    let limits = Limits::<3>::new(&vec![limit; joints], &[], 1e-6).expect("limits");
+    let limits = Limits::<4>::new(&vec![limit; joints], &[], 1e-6).expect("limits");
     let settings = Settings { servo_period_s: 1e-3, substeps: 1, settle_periods: 0 };
     let stands = mechanism.inverse(&start).expect("within reach");
     let mut planner =
-        Box::new(Planner::<K, 3, 256, 1024>::new(mechanism, limits, settings, start).expect("a planner"));
+        Box::new(Planner::<K, 4, 256, 1024>::new(mechanism, limits, settings, start).expect("a planner"));
     let timing = PulseTimingNs { step_length: 500, step_space: 500, dir_setup: 500, dir_hold: 500 };
     let timing = timing.ticks(1).expect("timing");
     let mut generators: Vec<StepGenerator> = (0..joints)
