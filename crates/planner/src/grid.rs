@@ -40,9 +40,8 @@ pub(crate) struct Node<const R: usize> {
     pub(crate) length: f64,
     /// Largest x from which the machine can follow the path.
     pub(crate) entry: f64,
-    /// Caps on x here, and what of them holds in the interval to the left and in the one to the right: where two pieces meet, the
-    /// slower one holds the other no further than here.
-    at: Caps,
+    /// Caps on x in the interval to the left and in the one to the right: here both hold, but where two pieces meet, the slower one
+    /// holds the other no further.
     before: Caps,
     after: Caps,
     /// The machine rests here.
@@ -85,7 +84,11 @@ impl Caps {
 impl<const R: usize> Node<R> {
     /// Cap on x with what the operator has set.
     pub(crate) fn cap(&self, panel: Panel) -> f64 {
-        if self.stop || panel.single_block && self.blocks > 0 { 0.0 } else { self.at.under(panel) }
+        if self.stop || panel.single_block && self.blocks > 0 {
+            0.0
+        } else {
+            self.before.lower(self.after).under(panel)
+        }
     }
 
     /// Cap on x between this node and the next.
@@ -250,7 +253,6 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             s: piece.from,
             length: 0.0,
             entry: 0.0,
-            at: caps,
             before: caps,
             after: caps,
             stop: true,
@@ -297,7 +299,6 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             tail.piece = number;
             tail.s = from;
             tail.after = Caps { hard: sample.hard, feed: sample.feed, rapid };
-            tail.at = tail.at.lower(tail.after);
             self.work.samples += 1;
         }
         self.grid.piece = number;
@@ -346,7 +347,6 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let s = if at_end { piece.to } else { start + step };
         let Some(tail) = self.nodes.back_mut() else { return Ok(()) };
         tail.length = step;
-        tail.at.hard = lower(tail.at.hard, between);
         tail.after.hard = lower(tail.after.hard, between);
         if start > piece.from {
             tail.before = tail.after;
@@ -365,7 +365,6 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             s,
             length: 0.0,
             entry: 0.0,
-            at: caps,
             before: caps,
             after: caps,
             stop: false,
