@@ -14,7 +14,7 @@ fn page(machine: &Machine, text: &[u8]) -> (String, Summary) {
     let checked = check_with(&program, machine, &options, |step| recorder.programmed(step)).unwrap();
     let judged = |_: &mut (), judged: &Judged| recorder.judged(judged);
     let go_on = |_: &_| ControlFlow::Continue(());
-    let run = run_checked(&program, machine, &options, checked, |_| (), go_on, judged);
+    let run = run_checked(&program, machine, &options, checked, |_| (), go_on, Some(judged));
     let summary = run.unwrap().0;
     let mut out = Vec::new();
     recorder.write(&summary, text, &mut out).unwrap();
@@ -31,7 +31,7 @@ fn first_period(machine: &Machine, text: &[u8]) -> Judged {
         first.get_or_insert(*judged);
     };
     let go_on = |_: &_| ControlFlow::Continue(());
-    run_checked(&program, machine, &options, checked, |_| (), go_on, judged).unwrap();
+    run_checked(&program, machine, &options, checked, |_| (), go_on, Some(judged)).unwrap();
     first.unwrap()
 }
 

@@ -2,6 +2,7 @@
 //! before any blend, for as long as the machine is near them.
 
 use pkm_kins::maths::sqrt;
+use pkm_planner::Setpoint;
 use pkm_planner::path::{Geometry, Line, Vector};
 use std::collections::VecDeque;
 
@@ -28,29 +29,55 @@ impl Programmed {
         self.chords.clear();
     }
 
-    /// Distance (mm; the larger of XYZ and UVW) of a pose from the path, and the place on the path that is nearest, while
-    /// the planner is on move `motion`, at `s` of it, or on the blend after it.
-    pub(crate) fn nearest(&mut self, motion: u32, s: f64, blending: bool, pose: &Vector) -> Option<Near> {
+    /// The machine has come to move `motion`: nothing before it is near.
+    pub(crate) fn pass(&mut self, motion: u32) {
         while self.moves.get(1).is_some_and(|(number, _)| *number <= motion) {
             self.moves.pop_front();
         }
-        let &(here, ref geometry) = self.moves.front().filter(|(number, _)| *number <= motion)?;
+        let here = self.moves.front().map_or(motion, |(number, _)| *number);
         while self.chords.front().is_some_and(|(number, _)| *number < here) {
             self.chords.pop_front();
         }
-        let mut best = self.off_move(here, geometry, if blending { geometry.length() } else { s }, pose);
-        if blending && let Some((next, geometry)) = self.moves.get(1) {
-            best = best.nearer(self.off_move(*next, geometry, 0.0, pose));
+    }
+
+    /// The move that the machine is on.
+    fn here(&self, setpoint: &Setpoint) -> Option<&(u32, Geometry)> {
+        self.moves.front().filter(|(number, _)| *number <= setpoint.motion)
+    }
+
+    /// The place of the path that is nearest to a pose, while the planner is at `setpoint`.
+    pub(crate) fn nearest(&self, setpoint: &Setpoint, pose: &Vector) -> Option<Near> {
+        let (here, geometry) = self.here(setpoint)?;
+        let best = self.off_move(*here, geometry, guess(setpoint, geometry), pose);
+        let next = self.moves.get(1).filter(|_| setpoint.blending);
+        Some(match next {
+            Some((next, geometry)) => best.nearer(self.off_move(*next, geometry, 0.0, pose)),
+            None => best,
+        })
+    }
+
+    /// The distance of a pose from the path, if it is above `mm`. The place that the planner is at is on the path too, so
+    /// the nearest one is looked for only if that place is farther.
+    pub(crate) fn beyond(&self, mm: f64, setpoint: &Setpoint, pose: &Vector) -> Option<f64> {
+        let (here, geometry) = self.here(setpoint)?;
+        let chords = self.chords.front().is_some_and(|(number, _)| number == here);
+        let s = guess(setpoint, geometry).clamp(0.0, geometry.length());
+        if !chords && off(&geometry.at(s).position, pose) <= mm {
+            return None;
         }
-        Some(best)
+        self.nearest(setpoint, pose).map(|near| near.distance_mm).filter(|distance| *distance > mm)
     }
 
     /// Distance from a move as it was programmed: from its chords, if it has any.
     fn off_move(&self, motion: u32, geometry: &Geometry, guess: f64, pose: &Vector) -> Near {
+        let after = self.chords.iter().skip_while(|(number, _)| *number < motion);
+        let mut chords = after.take_while(|(number, _)| *number == motion).peekable();
+        if chords.peek().is_none() {
+            return near(geometry, guess, pose);
+        }
         let mut best = Near { distance_mm: f64::INFINITY, place: *pose };
         let mut start = geometry.at(0.0).position;
-        let after = self.chords.iter().skip_while(|(number, _)| *number < motion);
-        for (_, end) in after.take_while(|(number, _)| *number == motion) {
+        for (_, end) in chords {
             if let Some(line) = Line::new(start, *end) {
                 // A line is found from anywhere.
                 best = best.nearer(near(&Geometry::Line(line), 0.0, pose));
@@ -75,28 +102,40 @@ impl Near {
     }
 }
 
+/// Where on its move the planner is; on the blend after it, the end.
+fn guess(setpoint: &Setpoint, geometry: &Geometry) -> f64 {
+    if setpoint.blending { geometry.length() } else { setpoint.s }
+}
+
+/// The larger of the distances in XYZ and UVW, mm.
+fn off(place: &Vector, pose: &Vector) -> f64 {
+    let norm = |from: usize| {
+        let d = |i: usize| place[from + i] - pose[from + i];
+        sqrt(d(0) * d(0) + d(1) * d(1) + d(2) * d(2))
+    };
+    norm(0).max(norm(6))
+}
+
 /// The place on a piece nearest to `pose`, found from `s` by Newton's method.
 fn near(geometry: &Geometry, mut s: f64, pose: &Vector) -> Near {
     const LENGTHS: [usize; 6] = [0, 1, 2, 6, 7, 8];
     let length = geometry.length();
+    let mut point = geometry.at(s);
     for _ in 0..4 {
-        let point = geometry.at(s);
         let (mut slope, mut curve) = (0.0, 0.0);
         for i in LENGTHS {
             let off = point.position[i] - pose[i];
             slope += point.first[i] * off;
             curve += point.first[i] * point.first[i] + point.second[i] * off;
         }
-        if curve > 0.0 {
-            s = (s - slope / curve).clamp(0.0, length);
+        let next = (s - slope / curve).clamp(0.0, length);
+        if !(curve > 0.0) || next == s {
+            break;
         }
+        s = next;
+        point = geometry.at(s);
     }
-    let place = geometry.at(s).position;
-    let norm = |from: usize| {
-        let d = |i: usize| place[from + i] - pose[from + i];
-        sqrt(d(0) * d(0) + d(1) * d(1) + d(2) * d(2))
-    };
-    Near { distance_mm: norm(0).max(norm(6)), place }
+    Near { distance_mm: off(&point.position, pose), place: point.position }
 }
 
 #[cfg(test)]

@@ -166,11 +166,11 @@ pub fn run<O: Observer + Send>(
     progress: impl FnMut(&Progress) -> ControlFlow<()> + Send,
 ) -> Result<(Summary, Option<O>), Diagnostic> {
     let checked = check(program, machine, options)?;
-    run_checked(program, machine, options, checked, outputs, progress, |_, _| {})
+    run_checked(program, machine, options, checked, outputs, progress, None::<fn(&mut O, &Judged)>)
 }
 
-/// [`run`] for a program that was checked already. `judged` sees the outputs and every servo period as the judge of the
-/// run saw it.
+/// [`run`] for a program that was checked already. `judged`, if there is one, sees the outputs and every servo period as
+/// the judge of the run saw it.
 ///
 /// # Errors
 /// As [`run`].
@@ -181,7 +181,7 @@ pub fn run_checked<O: Observer + Send>(
     mut checked: Checked,
     outputs: impl FnOnce(&Simulation) -> O + Send,
     progress: impl FnMut(&Progress) -> ControlFlow<()> + Send,
-    judged: impl FnMut(&mut O, &Judged) + Send,
+    judged: Option<impl FnMut(&mut O, &Judged) + Send>,
 ) -> Result<(Summary, Option<O>), Diagnostic> {
     if let Some(span) = checked.probes.filter(|_| options.workpiece(machine).is_empty()) {
         checked.diagnostics.push(messages::probe_not_wired(program, span));
@@ -206,7 +206,7 @@ fn drive<O: Observer>(
     checked: Checked,
     outputs: impl FnOnce(&Simulation) -> O,
     mut progress: impl FnMut(&Progress) -> ControlFlow<()>,
-    mut judged: impl FnMut(&mut O, &Judged),
+    mut judged: Option<impl FnMut(&mut O, &Judged)>,
 ) -> Result<(Summary, Option<O>), Diagnostic> {
     // A machine without a program for its spindle is simulated without it.
     let has_spindle = checked.turns || checked.probes.is_some();
@@ -239,12 +239,14 @@ fn drive<O: Observer>(
             findings.push(stop);
             break;
         }
-        let period = if homing {
-            account.homing(&controller.simulation, &controller.feeder)
+        if homing {
+            account.homing(&controller.simulation);
         } else {
-            account.tick(&controller.simulation, &mut controller.feeder)
-        };
-        judged(&mut outputs, &period);
+            account.tick(&controller.simulation, &mut controller.feeder);
+        }
+        if let Some(judged) = &mut judged {
+            judged(&mut outputs, &account.judged(&controller.simulation, &controller.feeder, homing));
+        }
     }
     let Controller { simulation, feeder, .. } = &mut controller;
     findings.append(&mut feeder.chains.warnings);

@@ -6,7 +6,7 @@ use crate::judged::Judged;
 use crate::program::Program;
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_gcode::Parameters;
-use pkm_hal_sim::{Setpoint, Simulation};
+use pkm_hal_sim::Simulation;
 use pkm_kins::machine::Mechanism;
 use pkm_kins::maths::sqrt;
 use pkm_kins::{Joints, Kinematics, MAX_JOINTS, Pose};
@@ -182,6 +182,9 @@ pub(crate) struct Account<'a> {
     closest: (u32, usize),
     /// Largest error in step, and periods in step.
     in_step: (f64, u64),
+    /// In the last period: the pose rebuilt from the edges, and the distance from a singularity.
+    executed: Option<Pose>,
+    measure: Option<f64>,
 }
 
 impl<'a> Account<'a> {
@@ -203,44 +206,26 @@ impl<'a> Account<'a> {
             singularity: f64::INFINITY,
             closest: (0, 0),
             in_step: (0.0, 0),
+            executed: None,
+            measure: None,
         }
     }
 
     /// A period of homing: it takes time, but is no path.
-    pub(crate) fn homing(&mut self, simulation: &Simulation, feeder: &Feeder<'_>) -> Judged {
+    pub(crate) fn homing(&mut self, simulation: &Simulation) {
         self.ticks += 1;
-        let Setpoint { pose, joints, .. } = *simulation.report().setpoint;
+        let joints = simulation.report().setpoint.joints;
         (self.last, self.min, self.max) = ([joints; 2], joints, joints);
-        let setpoint = pkm_planner::Setpoint { pose, joints, feed_use: 0.0, ..*feeder.setpoint() };
-        Judged {
-            tick: self.ticks,
-            setpoint,
-            mechanism: *feeder.mechanism(),
-            executed: None,
-            nearest: None,
-            deviation_mm: None,
-            singularity: None,
-            homing: true,
-        }
     }
 
-    pub(crate) fn tick(&mut self, simulation: &Simulation, feeder: &mut Feeder<'_>) -> Judged {
+    /// A period of the program.
+    pub(crate) fn tick(&mut self, simulation: &Simulation, feeder: &mut Feeder<'_>) {
         self.ticks += 1;
-        let setpoint = *feeder.setpoint();
-        let mechanism = *feeder.mechanism();
-        let mut judged = Judged {
-            tick: self.ticks,
-            setpoint,
-            mechanism,
-            executed: None,
-            nearest: None,
-            deviation_mm: None,
-            singularity: None,
-            homing: false,
-        };
+        (self.executed, self.measure) = (None, None);
+        let setpoint = feeder.setpoint();
         let [before, last] = self.last;
         let mut moved = false;
-        for (j, &q) in setpoint.joints.iter().enumerate() {
+        for (j, &q) in setpoint.joints.iter().enumerate().take(self.machine.joints.len()) {
             moved |= q != last[j];
             self.min[j] = self.min[j].min(q);
             self.max[j] = self.max[j].max(q);
@@ -259,31 +244,48 @@ impl<'a> Account<'a> {
             self.in_step = (most.max(error_mm.abs()), ticks + 1);
         }
         if feeder.is_switching() {
-            return judged;
+            return;
         }
+        let mechanism = feeder.mechanism();
         if let Ok(measure) = mechanism.singularity(&setpoint.pose) {
             let value = measure.inverse.min(measure.forward);
-            judged.singularity = Some(value);
+            self.measure = Some(value);
             if value < self.singularity {
                 self.singularity = value;
                 self.closest = (setpoint.span.line, measure.inverse_joint);
             }
         }
-        if let Ok(executed) = simulation.feedback_pose(&mechanism) {
-            judged.executed = Some(executed);
-            let (motion, s) = (setpoint.motion, setpoint.s);
-            if let Some(near) = feeder.programmed.nearest(motion, s, setpoint.blending, &executed.to_array())
-            {
-                self.deviation_mm = self.deviation_mm.max(near.distance_mm);
-                judged.nearest = Some(Pose::from_array(near.place));
-                judged.deviation_mm = Some(near.distance_mm);
-            }
-        }
         if self.ticks % REACH_EVERY == 1 {
-            let reach_mm = half_step_reach_mm(self.machine, &mechanism, &setpoint.pose, &setpoint.joints);
+            let reach_mm = half_step_reach_mm(self.machine, mechanism, &setpoint.pose, &setpoint.joints);
             self.reach_mm = self.reach_mm.max(reach_mm);
         }
-        judged
+        self.executed = simulation.feedback_pose(mechanism).ok();
+        if let Some(executed) = &self.executed {
+            feeder.programmed.pass(feeder.setpoint().motion);
+            let pose = executed.to_array();
+            let farthest = feeder.programmed.beyond(self.deviation_mm, feeder.setpoint(), &pose);
+            self.deviation_mm = farthest.unwrap_or(self.deviation_mm);
+        }
+    }
+
+    /// The last period, in full.
+    pub(crate) fn judged(&self, simulation: &Simulation, feeder: &Feeder<'_>, homing: bool) -> Judged {
+        let commanded = simulation.report().setpoint;
+        let setpoint = *feeder.setpoint();
+        let at_home =
+            pkm_planner::Setpoint { pose: commanded.pose, joints: commanded.joints, feed_use: 0.0, ..setpoint };
+        let executed = self.executed.filter(|_| !homing);
+        let near = executed.and_then(|pose| feeder.programmed.nearest(&setpoint, &pose.to_array()));
+        Judged {
+            tick: self.ticks,
+            setpoint: if homing { at_home } else { setpoint },
+            mechanism: *feeder.mechanism(),
+            executed,
+            nearest: near.map(|near| Pose::from_array(near.place)),
+            deviation_mm: near.map(|near| near.distance_mm),
+            singularity: self.measure.filter(|_| !homing),
+            homing,
+        }
     }
 
     pub(crate) fn finish(

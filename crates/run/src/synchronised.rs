@@ -87,6 +87,7 @@ pub(crate) struct SynchronisedDrive {
 
 impl SynchronisedDrive {
     /// The machine stands at the start of the first move; the spindle turns, or soon will, as `order` says.
+    #[inline(never)] // the chain is 400 KB until it is in its box: not on the stack of every tick
     pub(crate) fn new(
         program: &Program,
         machine: &Machine,

@@ -109,11 +109,7 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
             report.programmed(step);
         }
     })?;
-    let judged = |_: &mut Files, judged: &Judged| {
-        if let Some(report) = &mut report {
-            report.judged(judged);
-        }
-    };
+    let judged = report.as_mut().map(|report| |_: &mut Files, judged: &Judged| report.judged(judged));
     let result = pkm_run::run_checked(&program, &machine, &options, checked, outputs, progress, judged);
     bar.finish_and_clear();
     let (summary, files) = result?;
