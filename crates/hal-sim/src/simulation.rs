@@ -384,17 +384,19 @@ impl Simulation {
         for (n, (line, generator)) in lines.iter_mut().zip(stepgen.generators()).enumerate() {
             let (state, statistics) = (&mut states[n], &mut statistics[n]);
             let steps = hal.values().edges(line.step).read(&mut line.step_cursor, period.end());
-            let turns = hal.values().edges(line.dir).read(&mut line.dir_cursor, period.end());
+            let mut turns = hal.values().edges(line.dir).read(&mut line.dir_cursor, period.end());
             joint_edges[n].clear();
-            let mut turns = turns.iter().peekable();
             let cubic = generator.cubic();
             for step in steps {
-                while let Some(turn) = turns.next_if(|turn| turn.time <= step.time) {
+                while let [turn, later @ ..] = turns
+                    && turn.time <= step.time
+                {
                     line.positive = turn.level;
                     statistics.reversals += 1;
                     if collect {
                         joint_edges[n].push(edge(n, Line::Dir, turn));
                     }
+                    turns = later;
                 }
                 if step.level {
                     let before = (state.count - cubic.base) as f64;

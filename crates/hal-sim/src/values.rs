@@ -297,19 +297,18 @@ impl Values {
         &self.edges[self.bits.pins[pin.0 as usize] as usize]
     }
 
-    /// The same, taken out for the line's writer, who puts them back with [`Self::put_edges`].
+    /// The same, for the line's writer, who ends with [`Self::show_edges`].
     #[inline]
-    pub fn take_edges(&mut self, pin: BitPin) -> EdgeQueue {
-        std::mem::take(&mut self.edges[self.bits.pins[pin.0 as usize] as usize])
+    pub fn edges_mut(&mut self, pin: BitPin) -> &mut EdgeQueue {
+        &mut self.edges[self.bits.pins[pin.0 as usize] as usize]
     }
 
-    /// Puts the edges back; the line takes the level that it has at `now`.
+    /// The line takes the level that its edges give it at `now`.
     #[inline]
-    pub fn put_edges(&mut self, pin: BitPin, edges: EdgeQueue, now: u64) {
+    pub fn show_edges(&mut self, pin: BitPin, now: u64) {
         let cell = self.bits.pins[pin.0 as usize] as usize;
-        if let Some(level) = edges.level_at(now) {
+        if let Some(level) = self.edges[cell].level_at(now) {
             self.bits.cells[cell] = level;
         }
-        self.edges[cell] = edges;
     }
 }

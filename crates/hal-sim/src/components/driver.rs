@@ -202,18 +202,20 @@ impl Component for Drivers {
         for (driver, pins) in &mut self.channels {
             let enabled = values.bit(pins.enable);
             let steps = values.edges(pins.step).read(&mut pins.step_cursor, end);
-            let turns = values.edges(pins.dir).read(&mut pins.dir_cursor, end);
+            let mut turns = values.edges(pins.dir).read(&mut pins.dir_cursor, end);
             let position = driver.position;
             // an input whose edges were not seen (a broken wire, mended) has its level nevertheless
             let start_ns = tick.period.start() * self.timer_period_ns;
             let before = |edges: &[LineEdge], level| edges.first().map_or(level, |edge| !edge.level);
             driver.dir_edge(start_ns, before(turns, values.bit(pins.dir)));
             driver.step_edge(start_ns, before(steps, values.bit(pins.step)));
-            let mut turns = turns.iter().peekable();
             // both lines in order of time; at the same time the direction first, and its setup time is then 0
             for step in steps {
-                while let Some(turn) = turns.next_if(|turn| turn.time <= step.time) {
+                while let [turn, later @ ..] = turns
+                    && turn.time <= step.time
+                {
                     driver.dir_edge(turn.time * self.timer_period_ns, turn.level);
+                    turns = later;
                 }
                 driver.step_edge(step.time * self.timer_period_ns, step.level);
             }

@@ -16,7 +16,7 @@
 use crate::block::{Block, BlockPins};
 use crate::component::Tick;
 use crate::hal_error::HalError;
-use crate::values::{BitPin, EdgeQueue, FloatPin, U32Pin, Values};
+use crate::values::{BitPin, FloatPin, U32Pin, Values};
 use pkm_stepgen::Crossings;
 use pkm_stepgen::step_types::QUADRATURE;
 
@@ -67,17 +67,15 @@ impl Block for ShaftEncoder {
         let target = (values.float(self.position) + values.float(self.offset)) * values.float(self.scale);
         let (lost, frozen) = (values.bit(self.lost), values.bit(self.frozen));
         let (reversed, per_turn) = (values.bit(self.reversed), values.u32(self.counts_per_turn));
-        let mut queues = self.lines.map(|line| {
-            let mut queue = values.take_edges(line);
-            queue.retire(tick.period.start());
-            queue
-        });
-        let mut shown = self.levels;
-        let mut show = |time: u64, count: i64, queues: &mut [EdgeQueue; 3]| {
+        for line in self.lines {
+            values.edges_mut(line).retire(tick.period.start());
+        }
+        let (lines, shown) = (self.lines, &mut self.levels);
+        let mut show = |time: u64, count: i64| {
             let wanted = if lost { [false; 3] } else { levels(count, per_turn, reversed) };
-            for ((queue, shown), wanted) in queues.iter_mut().zip(&mut shown).zip(wanted) {
+            for ((line, shown), wanted) in lines.into_iter().zip(&mut *shown).zip(wanted) {
                 if !frozen && *shown != wanted {
-                    queue.push(time, wanted);
+                    values.edges_mut(line).push(time, wanted);
                     *shown = wanted;
                 }
             }
@@ -87,23 +85,22 @@ impl Block for ShaftEncoder {
         }
         if let Some(shaft) = &mut self.shaft {
             let mut count = shaft.count();
-            show(tick.period.start() + 1, count, &mut queues);
+            show(tick.period.start() + 1, count);
             let most = u64::from(tick.period.ticks());
             let moved = shaft.advance_straight(target, &tick.period, most, &mut |time, forward| {
                 count += if forward { 1 } else { -1 };
-                show(time, count, &mut queues);
+                show(time, count);
             });
             if moved.is_err() {
                 // a jump, or no number: the lines show the place where it ends, if there is one
                 if let Ok(there) = Crossings::new(target) {
-                    show(tick.period.end(), there.count(), &mut queues);
+                    show(tick.period.end(), there.count());
                     *shaft = there;
                 }
             }
         }
-        self.levels = shown;
-        for (line, queue) in self.lines.into_iter().zip(queues) {
-            values.put_edges(line, queue, tick.period.end());
+        for line in self.lines {
+            values.show_edges(line, tick.period.end());
         }
     }
 }

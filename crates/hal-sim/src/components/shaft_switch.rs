@@ -80,7 +80,9 @@ impl Block for ShaftSwitch {
         let here = position * sign;
         let threshold = if self.on { level - values.float(self.hysteresis).abs() } else { level };
         let on = here >= threshold;
-        let mut queue = values.take_edges(self.out);
+        let bounce = u64::from(values.u32(self.bounce_ns)) / self.timer_period_ns;
+        let seed = u64::from(values.u32(self.seed));
+        let queue = values.edges_mut(self.out);
         queue.retire(start);
         match self.last {
             None => {
@@ -100,9 +102,8 @@ impl Block for ShaftSwitch {
                         (self.shown, self.busy_until) = (level, time);
                     }
                 };
-                let bounce = u64::from(values.u32(self.bounce_ns)) / self.timer_period_ns;
                 self.switched += 1;
-                let mut random = hash(u64::from(values.u32(self.seed)) << 32 ^ self.switched);
+                let mut random = hash(seed << 32 ^ self.switched);
                 if bounce > 0 {
                     let bounces = 2 + random % 5;
                     let mut left = bounce;
@@ -122,12 +123,10 @@ impl Block for ShaftSwitch {
             Some(_) => {}
         }
         (self.last, self.on) = (Some(position), on);
-        values.put_edges(self.out, queue, end);
+        values.show_edges(self.out, end);
         // a contact that is stuck shows no edges either
         if values.bit(self.stuck_on) || values.bit(self.stuck_off) {
-            let mut queue = values.take_edges(self.out);
-            queue.retire(u64::MAX);
-            values.put_edges(self.out, queue, end);
+            values.edges_mut(self.out).retire(u64::MAX);
             self.shown = values.bit(self.stuck_on);
             values.set_bit(self.out, self.shown);
         } else if self.shown != self.on && end > self.busy_until {

@@ -155,31 +155,32 @@ impl Stepgen {
                 continue;
             }
             let lines = &pins.lines[..pins.step_type.lines()];
-            let mut queues: [EdgeQueue; MAX_PHASES] = Default::default();
-            for (queue, line) in queues.iter_mut().zip(lines) {
-                *queue = values.take_edges(*line);
-                queue.retire(start);
+            for line in lines {
+                values.edges_mut(*line).retire(start);
             }
             let result = if enabled {
-                let sink = |edge: Edge| queues[line_index(edge.line)].push(edge.time, edge.level);
                 let position = values.float(pins.position_cmd);
-                if values.float_is_linked(pins.velocity_cmd) {
-                    generator.advance(position, values.float(pins.velocity_cmd), &tick.period, sink)
-                } else {
-                    generator.advance_straight(position, &tick.period, sink)
+                let linked = values.float_is_linked(pins.velocity_cmd);
+                let velocity = linked.then(|| values.float(pins.velocity_cmd));
+                let sink =
+                    |edge: Edge| values.edges_mut(lines[line_index(edge.line)]).push(edge.time, edge.level);
+                match velocity {
+                    Some(velocity) => generator.advance(position, velocity, &tick.period, sink),
+                    None => generator.advance_straight(position, &tick.period, sink),
                 }
             } else if pins.step_type == StepType::StepDir {
                 // steps that were to come late do not come; a pulse that has begun ends
-                let [steps, turns, ..] = &mut queues;
-                let missing = net_steps(steps, turns, values.bit(pins.lines[1]));
-                steps.cut_after(start, values.bit(pins.lines[0]));
+                let (step, dir) = (lines[0], lines[1]);
+                let missing = net_steps(values.edges(step), values.edges(dir), values.bit(dir));
+                let level = values.bit(step);
+                values.edges_mut(step).cut_after(start, level);
                 generator.stand_at(generator.count() - missing)
             } else {
                 // of the other types, late steps still come
                 generator.stand_at(generator.count())
             };
-            for (queue, line) in queues.iter_mut().zip(lines) {
-                values.put_edges(*line, std::mem::take(queue), end);
+            for line in lines {
+                values.show_edges(*line, end);
             }
             // the other channels go on: all of them stop together in the next period
             let result = result.map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error });
