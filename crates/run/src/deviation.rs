@@ -61,8 +61,8 @@ impl Programmed {
     pub(crate) fn beyond(&self, mm: f64, setpoint: &Setpoint, pose: &Vector) -> Option<f64> {
         let (here, geometry) = self.here(setpoint)?;
         let chords = self.chords.front().is_some_and(|(number, _)| number == here);
-        let s = guess(setpoint, geometry).clamp(0.0, geometry.length());
-        if !chords && off(&geometry.at(s).position, pose) <= mm {
+        let place = || geometry.at(guess(setpoint, geometry)).position;
+        if !chords && off(&place(), pose) <= mm {
             return None;
         }
         self.nearest(setpoint, pose).map(|near| near.distance_mm).filter(|distance| *distance > mm)
@@ -102,9 +102,10 @@ impl Near {
     }
 }
 
-/// Where on its move the planner is; on the blend after it, the end.
+/// Where on its move the planner says it is; on the blend after it, the end.
 fn guess(setpoint: &Setpoint, geometry: &Geometry) -> f64 {
-    if setpoint.blending { geometry.length() } else { setpoint.s }
+    let s = if setpoint.blending { f64::INFINITY } else { setpoint.s };
+    s.max(0.0).min(geometry.length()) // what is no number is 0
 }
 
 /// The larger of the distances in XYZ and UVW, mm.
@@ -141,6 +142,9 @@ fn near(geometry: &Geometry, mut s: f64, pose: &Vector) -> Near {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use pkm_canon::Span;
+    use pkm_kins::Pose;
+    use pkm_planner::State;
     use pkm_planner::path::Arc;
 
     #[test]
@@ -151,5 +155,45 @@ mod tests {
         let pose = [10.3 * c, 10.3 * s, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         let got = near(&Geometry::Arc(arc), 9.0, &pose).distance_mm;
         assert!((got - 0.3).abs() < 1e-9, "{got}");
+    }
+
+    #[test]
+    fn what_the_planner_says_does_not_count() {
+        let to = |x| [x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let mut programmed = Programmed::default();
+        programmed.push(0, Geometry::Line(Line::new(to(0.0), to(10.0)).unwrap()), &[]);
+        // The chords of a move go where it does not.
+        let joined = Geometry::Line(Line::new(to(10.0), to(20.0)).unwrap());
+        let middle = [15.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        programmed.push(1, joined, &[middle, to(20.0)]);
+        let still = Setpoint {
+            pose: Pose::ZERO,
+            joints: Default::default(),
+            joint_velocity: Default::default(),
+            motion: 0,
+            s: 0.0,
+            blending: false,
+            feed_use: 1.0,
+            span: Span::default(),
+            state: State::Moving,
+            starved: false,
+        };
+        // Where it is said to be, said to be elsewhere, and gone past the end.
+        for (motion, s, x, y, want) in [
+            (0, 5.0, 5.0, 1e-6, Some(1e-6)),
+            (0, 1.0, 5.0, 1e-6, Some(1e-6)),
+            (0, 1.0, 5.0, 0.0, None),
+            (0, 10.5, 10.5, 0.0, Some(0.5)),
+            (0, f64::NAN, 5.0, 1e-6, Some(1e-6)),
+            (1, 5.0, 15.0, 0.0, Some(0.01)),
+            (1, 5.0, 15.0, 0.01, None),
+        ] {
+            let mut pose = to(x);
+            pose[1] = y;
+            programmed.pass(motion);
+            let got = programmed.beyond(1e-9, &Setpoint { motion, s, ..still }, &pose);
+            let close = |want: f64| got.is_some_and(|got| (got - want).abs() < 1e-5 * want);
+            assert!(want.map_or(got.is_none(), close), "{motion} {s} {x} {y}: {got:?}");
+        }
     }
 }

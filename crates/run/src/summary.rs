@@ -272,8 +272,12 @@ impl<'a> Account<'a> {
     pub(crate) fn judged(&self, simulation: &Simulation, feeder: &Feeder<'_>, homing: bool) -> Judged {
         let commanded = simulation.report().setpoint;
         let setpoint = *feeder.setpoint();
-        let at_home =
-            pkm_planner::Setpoint { pose: commanded.pose, joints: commanded.joints, feed_use: 0.0, ..setpoint };
+        let at_home = pkm_planner::Setpoint {
+            pose: commanded.pose,
+            joints: commanded.joints,
+            feed_use: 0.0,
+            ..setpoint
+        };
         let executed = self.executed.filter(|_| !homing);
         let near = executed.and_then(|pose| feeder.programmed.nearest(&setpoint, &pose.to_array()));
         Judged {

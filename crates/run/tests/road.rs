@@ -5,7 +5,7 @@
 use pkm_analysis::checker;
 use pkm_hal_sim::{Observer, Simulation, TickReport, TraceWriter, VcdSteps, VcdWriter};
 use pkm_machine::Machine;
-use pkm_run::{Options, Program, Summary, run};
+use pkm_run::{Judged, Options, Program, Summary, check, run, run_checked};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -34,32 +34,45 @@ struct Left {
     trace: Vec<u8>,
     vcd: Vec<u8>,
     counts: Vec<(u64, Vec<i64>)>,
+    /// Of all periods, each judged by itself.
+    largest_deviation_mm: f64,
 }
 
-fn drive(program: &str, machine: &Machine, options: &Options) -> Left {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../programs").join(program);
+fn shipped(program: &str) -> Program {
+    Program::File(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../programs").join(program))
+}
+
+fn drive(program: &Program, machine: &Machine) -> Left {
+    let options = Options::default();
     let outputs = |simulation: &Simulation| Outputs {
         trace: TraceWriter::new(Vec::new(), simulation),
         vcd: VcdWriter::new(Vec::new(), simulation),
         counts: Vec::new(),
     };
+    let mut largest_deviation_mm = 0.0_f64;
+    let judged = |_: &mut Outputs, judged: &Judged| {
+        largest_deviation_mm = largest_deviation_mm.max(judged.deviation_mm.unwrap_or(0.0));
+    };
+    let checked = check(program, machine, &options).expect("readable");
+    let go_on = |_: &_| ControlFlow::Continue(());
     let (summary, outputs) =
-        run(&Program::File(path), machine, options, outputs, |_| ControlFlow::Continue(()))
-            .expect("readable");
+        run_checked(program, machine, &options, checked, outputs, go_on, Some(judged)).expect("readable");
     let outputs = outputs.unwrap_or_else(|| panic!("refused: {:?}", summary.diagnostics));
     Left {
         summary,
         trace: outputs.trace.finish().unwrap(),
         vcd: outputs.vcd.finish().unwrap(),
         counts: outputs.counts,
+        largest_deviation_mm,
     }
 }
 
 /// `blend_mm`: what the program's G64 P allows beyond half a step of every joint.
 fn holds(program: &str, machine: &str, blend_mm: f64) {
     let machine = Machine::load(machine, &[]).expect("a shipped machine");
-    let Left { summary, trace, vcd, counts } = drive(program, &machine, &Options::default());
+    let Left { summary, trace, vcd, counts, largest_deviation_mm } = drive(&shipped(program), &machine);
     println!("{summary:#?}");
+    assert_eq!(summary.max_path_deviation_mm, largest_deviation_mm, "{program}");
     assert!(summary.completed, "{program}: {:?}", summary.diagnostics);
     assert!(summary.max_step_error_steps <= 0.5, "{program}: {}", summary.max_step_error_steps);
     assert_eq!(summary.driver_timing_violations, 0);
@@ -130,6 +143,25 @@ fn both_mechanisms_of_the_hv_mill() {
 #[test]
 fn both_forms_of_the_ox_glide() {
     holds("ox-glide-forms.ngc", "ox-glide-o", 0.02);
+}
+
+/// Chords that one move stands for, corners that are blended and corners that are not, lines and arcs.
+#[test]
+fn the_largest_deviation_is_that_of_all_periods() {
+    use std::fmt::Write as _;
+    let mut text = String::from("G21 G91 G64 P0.02 Q0.02 F1800\n");
+    for n in 0..200 {
+        let _ = writeln!(text, "G1 X{:.3} Y{:.3}", 0.1 * (1.0 - f64::from(n) / 100.0), 0.05);
+    }
+    text.push_str("G64 P0.1\nG1 X3\nG1 Y-4\nG61\nG2 X4 I2\nG1 X-2 Y-3\nG64\nG3 X-3 Y3 R3\nG1 X1\nM2\n");
+    let program = Program::Memory { name: "largest".to_owned(), text: text.into_bytes() };
+    for machine in ["xyz", "moma-a", "ox-glide"] {
+        let machine = Machine::load(machine, &[]).expect("a shipped machine");
+        let Left { summary, largest_deviation_mm, .. } = drive(&program, &machine);
+        assert!(summary.completed, "{:?}", summary.diagnostics);
+        assert!(largest_deviation_mm > summary.half_step_reach_mm, "{largest_deviation_mm}: no corner");
+        assert_eq!(summary.max_path_deviation_mm, largest_deviation_mm, "{}", machine.name);
+    }
 }
 
 #[test]
