@@ -14,7 +14,7 @@ use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::{Probe, Span};
 use pkm_gcode::{Interpreter, LineSource, Parameters, Status};
-use pkm_hal_sim::{Feedback, Operator, Orient, Setpoint, SetpointSource, SpindleCommand, SpindleFeedback};
+use pkm_hal_sim::{Feedback, Operator, Orient, Setpoint, SetpointSource, Simulation, SpindleCommand};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Joints, Kinematics, Pose};
 use pkm_machine::{Machine, Switched};
@@ -216,8 +216,8 @@ impl<'a> Feeder<'a> {
     }
 
     /// How far the tool is from where the spindle's turns (now, at the end of the period) say it should be, while it is in step.
-    pub(crate) fn synchronisation_error_mm(&self, spindle: &SpindleFeedback) -> Option<f64> {
-        self.in_step.as_ref().and_then(|drive| drive.error_mm(spindle))
+    pub(crate) fn synchronisation_error_mm(&self, simulation: &Simulation) -> Option<f64> {
+        self.in_step.as_ref()?.error_mm(&simulation.report().feedback.spindle)
     }
 
     /// The mechanism in force.
@@ -405,15 +405,19 @@ impl<'a> Feeder<'a> {
 
     /// The planned setpoint, or that of a form switch. The planner keeps step with the servo periods in either case.
     fn planned(&mut self) -> Result<pkm_planner::Setpoint, Diagnostic> {
-        let planned =
-            self.planner.tick().map_err(|error| messages::plan(self.program, self.machine, &error))?;
+        if let Err(error) = self.planner.tick() {
+            return Err(messages::plan(self.program, self.machine, &error));
+        }
         self.given += 1;
         if let Some(drive) = &mut self.in_step {
             let spindle = &self.feedback.spindle;
             return drive.next(self.program, self.machine, &self.mechanism, spindle, &self.setpoint);
         }
-        let Some(drive) = &mut self.form_switch else { return Ok(planned) };
-        Ok(drive.next(&self.mechanism, &planned))
+        let planned = self.planner.setpoint();
+        Ok(match &mut self.form_switch {
+            Some(drive) => drive.next(&self.mechanism, planned),
+            None => *planned,
+        })
     }
 
     /// The pose of averaged joints. Near a singularity they may have none; the planned one is shown then.

@@ -239,7 +239,7 @@ impl<'a> Account<'a> {
             self.first_motion.get_or_insert(self.ticks - 1);
             self.last_motion = self.ticks;
         }
-        if let Some(error_mm) = feeder.synchronisation_error_mm(&simulation.report().feedback.spindle) {
+        if let Some(error_mm) = feeder.synchronisation_error_mm(simulation) {
             let (most, ticks) = self.in_step;
             self.in_step = (most.max(error_mm.abs()), ticks + 1);
         }

@@ -183,8 +183,9 @@ impl Stepgen {
                 values.show_edges(*line, end);
             }
             // the other channels go on: all of them stop together in the next period
-            let result = result.map_err(|error| Fault::Steps { tick: tick.number, joint: n as u8, error });
-            refused = refused.and(result);
+            if let Err(error) = result {
+                refused = refused.and(Err(Fault::Steps { tick: tick.number, joint: n as u8, error }));
+            }
         }
         refused
     }
