@@ -1,7 +1,6 @@
 //! One servo period as the judge of a run saw it: what the report draws.
 
 use pkm_kins::Pose;
-use pkm_kins::machine::Mechanism;
 use pkm_planner::Setpoint;
 
 /// The end of a servo period.
@@ -11,8 +10,6 @@ pub struct Judged {
     pub tick: u64,
     /// What was commanded: pose, joints, line, feed got.
     pub setpoint: Setpoint,
-    /// The mechanism in force.
-    pub mechanism: Mechanism,
     /// The pose rebuilt from the step edges; `None` during a form switch, or where the counted joints have no pose.
     pub executed: Option<Pose>,
     /// The place of the programmed path nearest to it, before any blend.

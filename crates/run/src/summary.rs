@@ -270,20 +270,16 @@ impl<'a> Account<'a> {
 
     /// The last period, in full.
     pub(crate) fn judged(&self, simulation: &Simulation, feeder: &Feeder<'_>, homing: bool) -> Judged {
-        let commanded = simulation.report().setpoint;
-        let setpoint = *feeder.setpoint();
-        let at_home = pkm_planner::Setpoint {
-            pose: commanded.pose,
-            joints: commanded.joints,
-            feed_use: 0.0,
-            ..setpoint
-        };
+        let mut setpoint = *feeder.setpoint();
+        if homing {
+            let commanded = simulation.report().setpoint;
+            (setpoint.pose, setpoint.joints, setpoint.feed_use) = (commanded.pose, commanded.joints, 0.0);
+        }
         let executed = self.executed.filter(|_| !homing);
         let near = executed.and_then(|pose| feeder.programmed.nearest(&setpoint, &pose.to_array()));
         Judged {
             tick: self.ticks,
-            setpoint: if homing { at_home } else { setpoint },
-            mechanism: *feeder.mechanism(),
+            setpoint,
             executed,
             nearest: near.map(|near| Pose::from_array(near.place)),
             deviation_mm: near.map(|near| near.distance_mm),
