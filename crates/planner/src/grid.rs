@@ -22,7 +22,8 @@ const NODES_PER_PERIOD: f64 = 16.0;
 const NODES_PER_TICK: usize = 64;
 /// Nodes a push sets at most.
 pub(crate) const SET_PER_PUSH: usize = 64;
-/// Nodes a tick sets at most, unless it passes more: then as many as it passed. Room for fewer waits for more.
+/// So many more nodes than the last tick passed are set in a tick at most, so that the queue grows as long as there is path and
+/// room for them; room for fewer waits for more.
 const SET_PER_TICK: usize = 8;
 /// Nodes the look-ahead plans in a tick at most; a push grants it so many for each node it sets.
 const PLANNED_PER_TICK: usize = 64;
@@ -106,6 +107,8 @@ pub(crate) struct Grid<const R: usize> {
     /// step was before it begins the next.
     step: f64,
     after_step: f64,
+    /// No step on this piece is longer: what turns looks the same a turn later.
+    longest: f64,
     /// At the last node, and at the place that may become the next; the first of them is that of the last node if `swapped` is false.
     samples: [Sample<R>; 2],
     swapped: bool,
@@ -150,6 +153,7 @@ impl<const R: usize> Grid<R> {
             s: 0.0,
             step: f64::INFINITY,
             after_step: f64::INFINITY,
+            longest: f64::INFINITY,
             samples: [Sample::EMPTY; 2],
             swapped: false,
             planned: 0,
@@ -204,7 +208,7 @@ impl<const R: usize> Grid<R> {
 impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Planner<K, R, PIECES, NODES> {
     /// A tick's share of the work: what lies ahead is cut into nodes and planned, a little at a time.
     pub(crate) fn refill(&mut self, passed: usize) -> Result<(), PlanError> {
-        let budget = passed.max(SET_PER_TICK);
+        let budget = passed + SET_PER_TICK;
         let worth = self.nodes.len() + budget <= NODES;
         self.extend(if worth { budget } else { 0 }, PLANNED_PER_TICK)
     }
@@ -244,7 +248,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn first_node(&mut self) -> Result<(), PlanError> {
         let index = self.grid.piece.wrapping_sub(self.first_piece) as usize;
         let Some(piece) = self.pieces.get(index) else { return Ok(()) };
-        let number = self.grid.piece;
+        let (number, longest) = (self.grid.piece, piece.geometry.longest_step());
         let (sample, _) = self.grid.samples();
         self.limits.sample(&self.kinematics, piece, piece.from, sample)?;
         let caps = Caps { hard: sample.hard, feed: sample.feed, rapid: piece.rapid };
@@ -265,6 +269,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.grid.s = node.s;
         self.grid.step = f64::INFINITY;
         self.grid.after_step = f64::INFINITY;
+        self.grid.longest = longest;
         self.work.samples += 1;
         self.add(node);
         Ok(())
@@ -283,6 +288,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let Some(next) = self.pieces.get(index) else { return Ok(false) };
         let (stop, span) = self.piece(self.grid.piece).map_or((false, None), |p| (p.stop, Some(p.span)));
         let (from, rapid, dwell_ns) = (next.from, next.rapid, next.dwell_ns);
+        let longest = next.geometry.longest_step();
         let still = matches!(next.geometry, Geometry::Hold(_));
         // A new source line is a new block; a dwell always is.
         let block = still || span.is_some_and(|span| !is_same_block(span, next.span));
@@ -303,6 +309,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         }
         self.grid.piece = number;
         self.grid.s = from;
+        self.grid.longest = longest;
         Ok(true)
     }
 
@@ -315,7 +322,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let remaining = piece.to - start;
         self.work.samples += 1;
         let guess = self.grid.step;
-        let mut step = even(remaining, guess);
+        let mut step = even(remaining, lower(guess, self.grid.longest));
         let period = self.settings.servo_period_s;
         let (last, sample) = self.grid.samples();
         self.limits.sample(&self.kinematics, piece, start + step, sample)?;

@@ -261,7 +261,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     ///
     /// # Errors
     /// [`PushError::Full`]: tick first. [`PushError::Plan`]: the move cannot be run, with the first place on it that cannot
-    /// (looked at every millimetre or 0.02 rad, at most 64 times, before any of it is driven). Nothing more is taken
+    /// (looked at every millimetre or 0.02 rad, at most 67 times, before any of it is driven). Nothing more is taken
     /// then ([`Self::fault`]), and the machine comes to rest before that move.
     pub fn push(&mut self, next: Move) -> Result<u32, PushError> {
         if let Some(&fault) = self.fault() {

@@ -7,20 +7,16 @@ use crate::limits::Limits;
 use crate::pair::{higher, highest, with};
 use crate::path::Geometry;
 use core::ops::ControlFlow;
-use pkm_kins::{InverseError, Kinematics, Pose, Singularity, maths};
+use pkm_kins::{InverseError, Kinematics, Pose, Singularity};
 
-/// What a push looks at: a place every millimetre (or 0.02 rad), but no more than this.
+/// What a push looks at: a place every millimetre (or as [`Geometry::places`] has it for what turns), but no more than this: a prime
+/// number, so that those of an arc of many turns are not all on the same side of it.
 const SPACING_MM: f64 = 1.0;
-const SPACING_RAD: f64 = 0.02;
-const MOST_PLACES: u32 = 64;
+const MOST_PLACES: u32 = 67;
 
 /// Places that a push looks at on a move.
 pub(crate) fn places(geometry: &Geometry) -> u32 {
-    let length = geometry.length();
-    let first = geometry.tangent(0.0);
-    let turning = crate::path::norm3(&first, 3) * length / SPACING_RAD;
-    let count = maths::ceil((length / SPACING_MM).max(turning));
-    if count < f64::from(MOST_PLACES) { (count as u32).max(1) } else { MOST_PLACES }
+    geometry.places(SPACING_MM, MOST_PLACES)
 }
 
 impl<const R: usize> Limits<R> {

@@ -22,7 +22,7 @@ use pkm_planner::{Event, Feed, Frame, Move, PlanError, PlanErrorKind, Synchronis
 use std::collections::{BTreeSet, VecDeque};
 use std::ops::ControlFlow;
 
-/// Distance between samples, mm (or rad where only angles move), and the most samples a move gets.
+/// Distance between samples, mm (see `Geometry::places` for what turns), and the most samples a move gets.
 const SPACING: f64 = 0.25;
 const MOST_SAMPLES: u32 = 100_000;
 /// Findings kept.
@@ -369,9 +369,8 @@ fn check_move(
     if !step.rapid && !(step.feed.speed > 0.0) {
         findings.push(messages::feed_unset(program, span));
     }
-    let length = step.geometry.length();
     let bend = if matches!(step.geometry, Geometry::Line(_)) { 1.0 } else { 4.0 };
-    let count = (length * bend / SPACING).clamp(2.0, f64::from(MOST_SAMPLES)) as u32;
+    let count = step.geometry.places(SPACING / bend, MOST_SAMPLES).max(2);
     let mut nearest: Option<(f64, usize, Pose)> = None;
     let mut worst: Option<(PlanErrorKind, Pose)> = None;
     limits.walk(mechanism, &step.geometry, (count, true), None, |pose, outcome| {

@@ -14,7 +14,9 @@ pub use blend::{Blend, Tolerance};
 pub use line::Line;
 pub use spline::{MAX_ORDER, Spline};
 
-use pkm_kins::maths::sqrt;
+use pkm_kins::maths::{self, TAU, sqrt};
+
+const EIGHTH_TURN: f64 = TAU / 8.0;
 
 /// Nine coordinates or their derivatives, in letter order (mm, rad).
 pub type Vector = [f64; 9];
@@ -68,6 +70,38 @@ impl Geometry {
             Geometry::Line(line) => line.direction,
             _ => self.at(s).first,
         }
+    }
+
+    /// How far it turns, rad: A, B and C (at least), and about an arc's centre.
+    fn turning(&self) -> (f64, f64) {
+        match self {
+            Geometry::Line(line) => (norm3(&line.direction, 3) * line.length, 0.0),
+            Geometry::Arc(arc) => (norm3(&arc.rate, 3) * arc.length, arc.angle_rate.abs() * arc.length),
+            Geometry::Blend(blend) => {
+                let [_, c1, c2, c3] = &blend.coefficients;
+                (norm3(c1, 3) + 2.0 * norm3(c2, 3) + 3.0 * norm3(c3, 3), 0.0)
+            }
+            Geometry::Hold(_) => (0.0, 0.0),
+        }
+    }
+
+    /// The longest step, in s, over which it turns so little that what lies between cannot go unseen: a turn later everything looks
+    /// the same.
+    pub(crate) fn longest_step(&self) -> f64 {
+        let (rad, round) = self.turning();
+        let turned = rad.max(round);
+        if turned > EIGHTH_TURN { self.length() * (EIGHTH_TURN / turned) } else { f64::INFINITY }
+    }
+
+    /// Into how many parts it is cut to be looked at `spacing_mm` apart (of XYZ or UVW), or 0.02 rad (of ABC), or an eighth of a turn
+    /// about an arc's centre; at least 1, at most `most`.
+    pub fn places(&self, spacing_mm: f64, most: u32) -> u32 {
+        const SPACING_RAD: f64 = 0.02;
+        let (rad, round) = self.turning();
+        let uvw = norm3(&self.tangent(0.0), 6);
+        let mm = self.length() * uvw.max(1.0);
+        let count = maths::ceil((mm / spacing_mm).max(rad / SPACING_RAD).max(round / EIGHTH_TURN));
+        if count < f64::from(most) { (count as u32).max(1) } else { most }
     }
 
     /// Position and derivatives at s.
