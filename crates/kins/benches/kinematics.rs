@@ -77,9 +77,12 @@ fn motion(bencher: Bencher, name: &str) {
     let set = set(name);
     let velocity = Pose { x: 10.0, y: -20.0, ..Pose::ZERO };
     let acceleration = Pose { x: 100.0, y: 50.0, ..Pose::ZERO };
+    let mut motion = JointMotion::default();
     bencher.counter(divan::counter::ItemsCount::new(POSES)).bench_local(|| {
         for pose in &set.poses {
-            black_box(set.mechanism.motion(black_box(pose), &velocity, &acceleration)).ok();
+            let mechanism = &set.mechanism;
+            black_box(mechanism.motion_into(black_box(pose), &velocity, &acceleration, &mut motion)).ok();
+            black_box(&motion);
         }
     });
 }

@@ -22,6 +22,7 @@ use crate::attitude::Attitude;
 use crate::errors::{self, ForwardError, GeometryError, InverseError, Key};
 use crate::kinematics::{Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity};
 use crate::maths::{PI, TAU, cos, fabs, floor, sin, sqrt, sqrt_2};
+use crate::pair;
 use crate::pose::{Axis, AxisSet, Pose};
 use crate::vector::{Vec3, add, cross, dot, norm, scale, sub};
 
@@ -406,15 +407,26 @@ impl Kinematics for Hexapod {
         Ok(jacobian)
     }
 
+    fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
+        let mut motion = JointMotion::default();
+        self.motion_into(pose, velocity, acceleration, &mut motion)?;
+        Ok(motion)
+    }
+
     /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈, with d̈ = p̈ + (`[α]× + [ω]×²`) R a. Two struts at a time, the lengths with the operations of
     /// `struts` in their order.
-    fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
+    fn motion_into(
+        &self,
+        pose: &Pose,
+        velocity: &Pose,
+        acceleration: &Pose,
+        motion: &mut JointMotion,
+    ) -> Result<(), InverseError> {
         Self::finite(pose)?;
         let at = Attitude::of(pose);
         let (v, a) = (velocity, acceleration);
         let (omega, alpha) = at.spin(v, a);
         let bend = bend(omega, alpha);
-        let mut motion = JointMotion::default();
         let lengths = motion.position.as_chunks_mut().0.iter_mut();
         let rates = motion.velocity.as_chunks_mut().0.iter_mut();
         let seconds = motion.acceleration.as_chunks_mut().0.iter_mut();
@@ -431,7 +443,7 @@ impl Kinematics for Hexapod {
             let rest = pair::minus(square, pair::times(*rate, *rate));
             *second = pair::times(pair::plus(along, rest), part);
         }
-        if v.is_finite() && a.is_finite() { Ok(motion) } else { Err(InverseError::NotFinite) }
+        if v.is_finite() && a.is_finite() { Ok(()) } else { Err(InverseError::NotFinite) }
     }
 
     fn passage(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<Joints, InverseError> {
@@ -466,94 +478,6 @@ fn positive(lengths: [f64; 2], joints: [u8; 2]) -> Result<(), InverseError> {
         }
     }
     Ok(())
-}
-
-/// Vectors of two struts side by side, so that the processor can do both at once. Every function does with each of the two what
-/// its namesake in [`crate::vector`] does with one: the same bits.
-mod pair {
-    use crate::attitude::Attitude;
-    use crate::pose::Pose;
-    use crate::vector::Vec3;
-
-    type Two = [f64; 2];
-    /// Components, of both.
-    pub(super) type Pair = [Two; 3];
-
-    #[inline]
-    fn map(a: Two, b: Two, f: impl Fn(f64, f64) -> f64) -> Two {
-        [f(a[0], b[0]), f(a[1], b[1])]
-    }
-
-    #[inline]
-    pub(super) fn plus(a: Two, b: Two) -> Two {
-        map(a, b, |a, b| a + b)
-    }
-
-    #[inline]
-    pub(super) fn minus(a: Two, b: Two) -> Two {
-        map(a, b, |a, b| a - b)
-    }
-
-    #[inline]
-    pub(super) fn times(a: Two, b: Two) -> Two {
-        map(a, b, |a, b| a * b)
-    }
-
-    /// Six vectors, two and two.
-    pub(super) fn all([a, b, c, d, e, f]: &[Vec3; 6]) -> [Pair; 3] {
-        [[a, b], [c, d], [e, f]].map(|[u, v]| [[u[0], v[0]], [u[1], v[1]], [u[2], v[2]]])
-    }
-
-    /// And one by one again.
-    #[inline]
-    pub(super) fn apart([p, q, r]: &[Pair; 3]) -> [Vec3; 6] {
-        let one = |[x, y, z]: &Pair, k: usize| [x[k & 1], y[k & 1], z[k & 1]];
-        [one(p, 0), one(p, 1), one(q, 0), one(q, 1), one(r, 0), one(r, 1)]
-    }
-
-    /// The same vector for both.
-    #[inline]
-    pub(super) fn both(v: Vec3) -> Pair {
-        v.map(|x| [x, x])
-    }
-
-    #[inline]
-    pub(super) fn add(u: Pair, v: Pair) -> Pair {
-        [plus(u[0], v[0]), plus(u[1], v[1]), plus(u[2], v[2])]
-    }
-
-    #[inline]
-    pub(super) fn sub(u: Pair, v: Pair) -> Pair {
-        [minus(u[0], v[0]), minus(u[1], v[1]), minus(u[2], v[2])]
-    }
-
-    #[inline]
-    pub(super) fn dot(u: Pair, v: Pair) -> Two {
-        plus(plus(times(u[0], v[0]), times(u[1], v[1])), times(u[2], v[2]))
-    }
-
-    #[inline]
-    pub(super) fn cross([ux, uy, uz]: Pair, [vx, vy, vz]: Pair) -> Pair {
-        let minor = |a: Two, b: Two, c: Two, d: Two| minus(times(a, b), times(c, d));
-        [minor(uy, vz, uz, vy), minor(uz, vx, ux, vz), minor(ux, vy, uy, vx)]
-    }
-
-    /// R a and the way from base to platform, p + R a − b.
-    #[inline]
-    pub(super) fn strut(at: &Attitude, pose: &Pose, point: &Pair, base: &Pair) -> (Pair, Pair) {
-        let arm = rotate(at, *point);
-        (arm, sub(add(both([pose.x, pose.y, pose.z]), arm), *base))
-    }
-
-    /// As [`Attitude::rotate`].
-    #[inline]
-    pub(super) fn rotate(at: &Attitude, [bx, by, bz]: Pair) -> Pair {
-        let two = |(s, c): (f64, f64)| ([s, s], [c, c]);
-        let ((ss, cs), (st, ct), (sp, cp)) = (two(at.psi), two(at.theta), two(at.phi));
-        let (y, z) = (minus(times(cs, by), times(ss, bz)), plus(times(ss, by), times(cs, bz)));
-        let (x, height) = (plus(times(ct, bx), times(st, z)), minus(times(ct, z), times(st, bx)));
-        [minus(times(cp, x), times(sp, y)), plus(times(sp, x), times(cp, y)), height]
-    }
 }
 
 #[cfg(test)]

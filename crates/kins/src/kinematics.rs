@@ -236,6 +236,23 @@ pub trait Kinematics {
     /// As [`Self::jacobian`].
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError>;
 
+    /// [`Self::motion`] straight into the machine's own places of `motion`: the others keep their value, and after an error
+    /// nothing of it counts. What the planner calls at every node.
+    ///
+    /// # Errors
+    /// As [`Self::motion`].
+    #[inline]
+    fn motion_into(
+        &self,
+        pose: &Pose,
+        velocity: &Pose,
+        acceleration: &Pose,
+        motion: &mut JointMotion,
+    ) -> Result<(), InverseError> {
+        *motion = self.motion(pose, velocity, acceleration)?;
+        Ok(())
+    }
+
     /// The joints at `pose` if nothing is in the way of a motion through it: what [`Self::motion`] answers and refuses,
     /// without the derivatives. For looking along a path.
     ///

@@ -28,6 +28,7 @@ pub mod moma_4s;
 pub mod moma_w;
 pub mod named;
 pub mod ox_glide;
+mod pair;
 pub mod planar;
 pub mod pose;
 pub mod vector;

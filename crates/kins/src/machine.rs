@@ -88,6 +88,10 @@ macro_rules! mechanisms {
                 match self { $(Self::$name(m) => Kinematics::motion(m, pose, velocity, acceleration)),+ }
             }
             #[inline]
+            fn motion_into(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose, motion: &mut JointMotion) -> Result<(), InverseError> {
+                match self { $(Self::$name(m) => m.motion_into(pose, velocity, acceleration, motion)),+ }
+            }
+            #[inline]
             fn passage(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<Joints, InverseError> {
                 match self { $(Self::$name(m) => Kinematics::passage(m, pose, velocity, acceleration)),+ }
             }

@@ -32,6 +32,7 @@ use crate::kinematics::{
     Branches, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity,
 };
 use crate::maths::{cos_sin_deg, fabs, sqrt, sqrt_2};
+use crate::pair::{minus, plus, times};
 use crate::pose::{Axis, AxisSet, Pose};
 
 /// A point or vector in the plane, mm.
@@ -446,36 +447,11 @@ impl Planar {
         Err(InverseError::Singular { measure: (fabs(w1) / c1.link).min(fabs(w2) / c2.link) })
     }
 
-    /// Joint rates and accelerations for a T moving with `velocity` and `acceleration`:
+    /// p, ṗ, p̈ for T moving with `velocity` and `acceleration`, the planner's call: ṗᵢ = Lᵢ·Ṫ / wᵢ and
     /// p̈ᵢ = (Lᵢ·T̈ + |Ṫ − aᵢ ṗᵢ|²) / wᵢ.
     ///
     /// # Errors
-    /// As [`Self::rates`]; `NotFinite` if a rate is not finite.
-    #[inline]
-    pub fn rates_along(
-        &self,
-        state: &PlanarState,
-        velocity: Vec2,
-        acceleration: Vec2,
-    ) -> Result<([f64; 2], [f64; 2]), InverseError> {
-        self.guard(state)?;
-        let one = |c: &Chain, l: Vec2, w: f64| {
-            let rate = dot(l, velocity) / w;
-            let turn = along(velocity, -rate, c.direction);
-            (rate, (dot(l, acceleration) + dot(turn, turn)) / w)
-        };
-        let (v1, a1) = one(&self.chains[0], state.links[0], state.along[0]);
-        let (v2, a2) = one(&self.chains[1], state.links[1], state.along[1]);
-        if !(a1.is_finite() && a2.is_finite()) {
-            return Err(InverseError::NotFinite);
-        }
-        Ok(([v1, v2], [a1, a2]))
-    }
-
-    /// p, ṗ, p̈ for T moving with `velocity` and `acceleration`: the planner's call.
-    ///
-    /// # Errors
-    /// As [`Self::inverse`] and [`Self::rates_along`].
+    /// As [`Self::inverse`] and [`Self::rates`]; `NotFinite` if a rate is not finite.
     #[inline]
     pub fn motion_2(
         &self,
@@ -484,8 +460,22 @@ impl Planar {
         acceleration: Vec2,
     ) -> Result<[[f64; 2]; 3], InverseError> {
         let state = self.solve(t)?;
-        let (v, a) = self.rates_along(&state, velocity, acceleration)?;
-        Ok([state.joints, v, a])
+        self.guard(&state)?;
+        // Both chains side by side: x of both, y of both.
+        let ([l1, l2], [c1, c2]) = (state.links, &self.chains);
+        let (lx, ly) = ([l1[0], l2[0]], [l1[1], l2[1]]);
+        let (gx, gy) = ([c1.direction[0], c2.direction[0]], [c1.direction[1], c2.direction[1]]);
+        let ([vx, vy], [ax, ay]) = (velocity.map(|v| [v, v]), acceleration.map(|a| [a, a]));
+        let part = state.along.map(|w| 1.0 / w);
+        let rate = times(plus(times(lx, vx), times(ly, vy)), part);
+        let (turn_x, turn_y) = (minus(vx, times(rate, gx)), minus(vy, times(rate, gy)));
+        let pull = plus(times(lx, ax), times(ly, ay));
+        let second = times(plus(pull, plus(times(turn_x, turn_x), times(turn_y, turn_y))), part);
+        let size = second.map(fabs);
+        if !(size[0] < f64::INFINITY && size[1] < f64::INFINITY) {
+            return Err(InverseError::NotFinite);
+        }
+        Ok([state.joints, rate, second])
     }
 
     /// μᵢ = |wᵢ|/lᵢ and ν = |X|/(l₁ l₂).
@@ -584,13 +574,25 @@ impl Kinematics for Planar {
 
     #[inline]
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
-        let [position, velocity, acceleration] =
-            self.motion_2([pose.x, pose.y], [velocity.x, velocity.y], [acceleration.x, acceleration.y])?;
-        Ok(JointMotion {
-            position: joints(position),
-            velocity: joints(velocity),
-            acceleration: joints(acceleration),
-        })
+        let mut motion = JointMotion::default();
+        self.motion_into(pose, velocity, acceleration, &mut motion)?;
+        Ok(motion)
+    }
+
+    #[inline]
+    fn motion_into(
+        &self,
+        pose: &Pose,
+        velocity: &Pose,
+        acceleration: &Pose,
+        motion: &mut JointMotion,
+    ) -> Result<(), InverseError> {
+        let (t, v, a) = ([pose.x, pose.y], [velocity.x, velocity.y], [acceleration.x, acceleration.y]);
+        let [p, rate, second] = self.motion_2(t, v, a)?;
+        [motion.position[0], motion.position[1]] = p;
+        [motion.velocity[0], motion.velocity[1]] = rate;
+        [motion.acceleration[0], motion.acceleration[1]] = second;
+        Ok(())
     }
 
     fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
@@ -676,6 +678,16 @@ macro_rules! planar_kinematics {
                 acceleration: &$crate::Pose,
             ) -> Result<$crate::JointMotion, $crate::InverseError> {
                 self.planar.motion(pose, velocity, acceleration)
+            }
+            #[inline]
+            fn motion_into(
+                &self,
+                pose: &$crate::Pose,
+                velocity: &$crate::Pose,
+                acceleration: &$crate::Pose,
+                motion: &mut $crate::JointMotion,
+            ) -> Result<(), $crate::InverseError> {
+                self.planar.motion_into(pose, velocity, acceleration, motion)
             }
             fn singularity(&self, pose: &$crate::Pose) -> Result<$crate::Singularity, $crate::InverseError> {
                 self.planar.singularity(pose)

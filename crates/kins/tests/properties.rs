@@ -7,7 +7,8 @@ mod common;
 mod zoo;
 
 use pkm_kins::{
-    Axis, ForwardError, InverseError, Jacobian, JointKind, Joints, Kinematics, MAX_JOINTS, Pose, Singularity,
+    Axis, ForwardError, InverseError, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Pose,
+    Singularity,
 };
 use zoo::{Case, Rng, cases, count, seed};
 
@@ -166,7 +167,8 @@ fn writing_in_place_is_the_same() {
     assert!(unreachable.into_inner() > 0 && impossible.into_inner() > 0, "nothing was refused");
 }
 
-/// Looking along a path asks for the joints only, and is refused what a motion is refused, for the same reason.
+/// Looking along a path asks for the joints only, and is refused what a motion is refused, for the same reason; so is a motion straight
+/// into place.
 #[test]
 fn a_passage_answers_and_refuses_what_a_motion_does() {
     use std::sync::atomic::{AtomicUsize, Ordering};
@@ -188,6 +190,17 @@ fn a_passage_answers_and_refuses_what_a_motion_does() {
             let expected = m.motion(&pose, &velocity, &acceleration).map(|motion| bits(motion.position));
             let found = m.passage(&pose, &velocity, &acceleration).map(bits);
             assert_eq!(found, expected, "{pose:?} {velocity:?} {acceleration:?}");
+            // The same straight into place, where other joints of the machine's controller keep their value.
+            let whole = m.motion(&pose, &velocity, &acceleration);
+            let mut own = JointMotion { position: [7.0; 9], velocity: [7.0; 9], acceleration: [7.0; 9] };
+            let answer = m.motion_into(&pose, &velocity, &acceleration, &mut own);
+            assert_eq!(answer.err(), whole.err());
+            if let Ok(whole) = whole {
+                for joint in 0..m.joint_count() {
+                    let of = |m: &JointMotion| [m.position[joint], m.velocity[joint], m.acceleration[joint]];
+                    assert_eq!(of(&own).map(f64::to_bits), of(&whole).map(f64::to_bits), "joint {joint}");
+                }
+            }
             let counter = if found.is_ok() { &passed } else { &refused };
             counter.fetch_add(1, Ordering::Relaxed);
         }

@@ -3,13 +3,14 @@
 //! what is permitted; the strips hold in every one of them, on the path.
 
 use crate::grid::Node;
-use crate::interval::{accelerations, exits};
-use crate::limits::{Rows, Sample};
+use crate::interval::{SLACK, accelerations, allows, exits};
+use crate::limits::{Rows, Sample, Spot};
 use crate::operator::Panel;
-use crate::pair::{each, higher, highest, with};
+use crate::pair::{each, higher, highest, lower, with};
+use crate::path::Place;
 use crate::planner::{PathMode, Planner, Setpoint, State};
 use crate::{PlanError, PlanErrorKind};
-use pkm_kins::{Kinematics, Pose, maths::sqrt};
+use pkm_kins::{JointMotion, Kinematics, Pose, maths::sqrt};
 
 /// Nodes passed in one tick at the very most (the grid holds the speed down to about 128).
 const MOST_NODES: usize = 1024;
@@ -19,6 +20,14 @@ const MOST_NODES: usize = 1024;
 struct Leg {
     end: f64,
     x: f64,
+    /// √x
+    v: f64,
+}
+
+impl Leg {
+    fn to(end: f64, x: f64) -> Self {
+        Self { end, x, v: sqrt(x) }
+    }
 }
 
 /// Down, along, up: the one driven now is the last.
@@ -29,8 +38,9 @@ type Legs = heapless::Vec<Leg, 3>;
 pub(crate) struct Executor {
     /// Distance from the front node.
     sigma: f64,
-    /// ṡ² here.
+    /// ṡ² here, and ṡ.
     x: f64,
+    v: f64,
     /// The legs still to be driven to the next node.
     legs: Legs,
     planned: bool,
@@ -48,6 +58,9 @@ pub(crate) struct Executor {
     pub(crate) stepped: bool,
     /// Nodes passed ([`crate::Work`]) when the last servo period began.
     passed_before: u64,
+    /// What was published last.
+    place: Place,
+    motion: JointMotion,
 }
 
 impl Executor {
@@ -55,6 +68,7 @@ impl Executor {
         Self {
             sigma: 0.0,
             x: 0.0,
+            v: 0.0,
             legs: Legs::default(),
             planned: false,
             substep: 0,
@@ -66,6 +80,8 @@ impl Executor {
             panel: Panel::NEUTRAL,
             stepped: false,
             passed_before: 0,
+            place: Place::ZERO,
+            motion: JointMotion::default(),
         }
     }
 
@@ -79,7 +95,7 @@ impl Executor {
 
     pub(crate) fn rest(&mut self) {
         self.sigma = 0.0;
-        self.x = 0.0;
+        (self.x, self.v) = (0.0, 0.0);
         self.planned = false;
         self.abort = false;
         self.stepped = false;
@@ -88,6 +104,13 @@ impl Executor {
     /// At rest at the front node.
     pub(crate) fn is_at_node(&self) -> bool {
         self.x == 0.0 && self.sigma == 0.0
+    }
+
+    /// The next leg, alone.
+    fn take(&mut self, leg: Leg) {
+        self.planned = true;
+        self.legs.clear();
+        let _ = self.legs.push(leg);
     }
 
     /// What is permitted has changed: the rest of the interval is planned again.
@@ -210,27 +233,25 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     fn advance(&mut self, time: f64, held: bool) -> bool {
         let mut remaining = time;
         for _ in 0..MOST_NODES {
-            let Some(node) = self.nodes.front() else { return true };
-            let length = node.length;
-            if self.nodes.len() < 2 {
-                self.executor.x = 0.0;
+            let (Some(node), Some(next)) = (self.nodes.front(), self.nodes.get(1)) else {
+                (self.executor.x, self.executor.v) = (0.0, 0.0);
                 return true;
-            }
+            };
+            let length = node.length;
             if !self.executor.planned {
-                if !held && let Some(x_end) = self.brief_exit() {
-                    let duration = 2.0 * length / (sqrt(self.executor.x) + sqrt(x_end));
+                if !held && let Some(x_end) = self.brief_exit(node, next) {
+                    let v_end = sqrt(x_end);
+                    let duration = 2.0 * length / (self.executor.v + v_end);
                     if duration <= remaining {
                         remaining -= duration;
-                        self.executor.x = x_end;
+                        (self.executor.x, self.executor.v) = (x_end, v_end);
                         self.pass_node();
                         if self.stops_here() {
                             return true;
                         }
                         continue;
                     }
-                    self.executor.legs.clear();
-                    let _ = self.executor.legs.push(Leg { end: length, x: x_end });
-                    self.executor.planned = true;
+                    self.executor.take(Leg { end: length, x: x_end, v: v_end });
                 } else if !self.plan_leg(held) {
                     return true;
                 }
@@ -238,22 +259,22 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             let e = &mut self.executor;
             let Some(&leg) = e.legs.last() else { return true };
             let distance = leg.end - e.sigma;
-            let (v, v_end) = (sqrt(e.x), sqrt(leg.x));
-            let duration = if v + v_end > 0.0 { 2.0 * distance / (v + v_end) } else { f64::INFINITY };
-            if !(duration <= remaining) {
-                let speed = v + (leg.x - e.x) / (2.0 * distance) * remaining;
+            // Twice the mean speed of the leg: it takes `way` over that.
+            let (way, pace) = (2.0 * distance, e.v + leg.v);
+            if !(pace > 0.0 && way <= remaining * pace) {
+                let speed = e.v + (leg.x - e.x) / way * remaining;
                 // Braking to rest may seem to end just before the leg does; that is rounding, and the leg is over.
-                let arrived = leg.x == 0.0 && v > 0.0 && !(speed > 0.0);
+                let arrived = leg.x == 0.0 && e.v > 0.0 && !(speed > 0.0);
                 if !arrived {
-                    if distance > 0.0 && duration.is_finite() {
-                        e.sigma = (e.sigma + 0.5 * (v + speed) * remaining).min(leg.end);
-                        e.x = speed * speed;
+                    if distance > 0.0 && pace > 0.0 {
+                        e.sigma = (e.sigma + 0.5 * (e.v + speed) * remaining).min(leg.end);
+                        (e.x, e.v) = (speed * speed, speed);
                     }
                     return false;
                 }
             }
-            remaining = (remaining - duration).max(0.0);
-            e.x = leg.x;
+            remaining = (remaining - way / pace).max(0.0);
+            (e.x, e.v) = (leg.x, leg.v);
             e.legs.pop();
             if leg.end < length {
                 e.sigma = leg.end;
@@ -276,11 +297,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     /// True at rest at the front node. Where the plan says rest, what is left of the speed is rounding.
     fn stops_here(&mut self) -> bool {
         const REST_MM: f64 = 1e-9;
-        let single = self.executor.panel.single_block
-            && sqrt(self.executor.x) * self.settings.servo_period_s <= REST_MM;
+        let single =
+            self.executor.panel.single_block && self.executor.v * self.settings.servo_period_s <= REST_MM;
         let stops = self.nodes.front().is_some_and(|node| node.stop || single && node.blocks > 0);
         if stops {
-            self.executor.x = 0.0;
+            (self.executor.x, self.executor.v) = (0.0, 0.0);
         }
         self.executor.x == 0.0
     }
@@ -310,69 +331,92 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         // What is being driven, if it leads to the node (a braking leg may end before).
         let running =
             self.executor.legs.first().filter(|leg| sigma > 0.0 && leg.end >= node.length).map(|leg| leg.x);
-        let mut legs = Legs::new();
-        let mut add = |end: f64, x: f64| {
-            // The end of the interval is the node itself, not a sum.
-            let end = if end < length { sigma + end } else { node.length };
-            let _ = legs.push(Leg { end, x: higher(0.0, x) });
-        };
+        // What is driven first comes last.
+        let mut shape = None;
+        let (end, x_end);
         if held {
             if x == 0.0 {
                 return false;
             }
-            let (end, x_end) = braking(here, &next.left, rows, length, x, running);
-            add(end, x_end);
+            (end, x_end) = braking(here, &next.left, rows, length, x, running);
         } else {
+            let entry = self.permitted(1, next);
+            // As a rule what is permitted can be reached, and nothing faster is allowed on the way.
+            if sigma == 0.0
+                && node.cap_until(next, panel) <= lower(x, entry)
+                && allows(here, &next.left, rows, length, (x, entry), SLACK)
+                && entry > 0.0
+            {
+                self.executor.take(Leg::to(length, entry));
+                return true;
+            }
             let (low, high) = exits(here, &next.left, rows, length, x);
             // From the middle of an interval the strips, taken there anew, may exclude by a hair what is being driven;
             // that stays admissible.
             let (low, high) = running.map_or((low, high), |running| (low.min(running), high.max(running)));
-            let entry = self.permitted(1, next);
-            let x_end = if low <= high { entry.clamp(low, high) } else { 0.5 * (low + high) };
+            (end, x_end) = (length, if low <= high { entry.clamp(low, high) } else { 0.5 * (low + high) });
             if x == 0.0 && self.nodes.len() == 2 && self.pieces.back().is_some_and(|last| last.open) {
                 // At rest with one interval known and more to come.
                 return false;
             }
-            let cap = node.cap_until(next, panel);
             // A peak in between gains something only where the exit is held down by what follows, not by the strips,
             // and where the interval takes more than a quarter of a period.
-            let brief = self.is_brief(length, x.min(x_end));
+            let slowest = lower(x, x_end);
             let edge = 1e-3 * (high - low);
-            let free = (low <= 0.0 || x_end - low > edge) && high - x_end > edge && cap > x.min(x_end);
-            let shape =
-                if free && !brief { faster(here, &next.left, rows, length, x, x_end, cap) } else { None };
-            match shape {
-                Some((up, along, peak)) => {
-                    if along < length {
-                        add(length, x_end);
-                    }
-                    if along > up {
-                        add(along, peak);
-                    }
-                    if up > 0.0 {
-                        add(up, peak);
-                    }
+            let free = (low <= 0.0 || x_end - low > edge) && high - x_end > edge;
+            if free && !self.is_brief(length, slowest) {
+                let cap = node.cap_until(next, panel);
+                if cap > slowest {
+                    shape = faster(here, &next.left, rows, length, x, x_end, cap);
                 }
-                None if x == 0.0 && x_end == 0.0 => return false,
-                None => add(length, x_end),
+            }
+            if shape.is_none() && x == 0.0 && x_end == 0.0 {
+                return false;
             }
         }
-        self.executor.legs = legs;
-        self.executor.planned = true;
+        let e = &mut self.executor;
+        e.planned = true;
+        e.legs.clear();
+        let mut add = |end: f64, x: f64| {
+            // The end of the interval is the node itself, not a sum.
+            let end = if end < length { sigma + end } else { node.length };
+            let _ = e.legs.push(Leg::to(end, higher(0.0, x)));
+        };
+        match shape {
+            Some((up, along, peak)) => {
+                if along < length {
+                    add(length, x_end);
+                }
+                if along > up {
+                    add(along, peak);
+                }
+                if up > 0.0 {
+                    add(up, peak);
+                }
+            }
+            None => add(end, x_end),
+        }
         true
     }
 
     /// The strips at a place between two nodes.
     #[inline(never)]
     fn strips_at(&self, piece: u64, s: f64) -> Option<Rows<R>> {
-        let mut sample = Sample::EMPTY;
-        self.limits.sample(&self.kinematics, self.piece(piece)?, s, &mut sample).ok()?;
+        let (mut sample, mut spot) = (Sample::EMPTY, Spot::NONE);
+        let piece = self.piece(piece)?;
+        spot.look(piece, s);
+        self.limits.sample(&self.kinematics, piece, &mut spot, &mut sample).ok()?;
         Some(sample.rows)
     }
 
     /// The x at which node `index` may be passed under the overrides of now.
+    #[inline]
     fn permitted(&self, index: usize, node: &Node<R>) -> f64 {
         let panel = self.executor.panel;
+        // As a rule it was planned with these, and its cap went into that.
+        if self.grid.is_planned_with(panel) {
+            return node.entry;
+        }
         (node.entry * self.grid.share(index, panel)).min(node.cap(panel))
     }
 
@@ -384,14 +428,18 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
 
     /// The x at the end of the front interval, if that is brief, entered at its start and not a start from rest: one
     /// acceleration serves it, as in [`Self::plan_leg`].
-    fn brief_exit(&self) -> Option<f64> {
-        let (node, next) = (self.nodes.front()?, self.nodes.get(1)?);
+    fn brief_exit(&self, node: &Node<R>, next: &Node<R>) -> Option<f64> {
         let x = self.executor.x;
         if self.executor.sigma != 0.0 || !self.is_brief(node.length, x) {
             return None;
         }
-        let (low, high) = exits(&node.right, &next.left, self.limits.rows(), node.length, x);
-        let x_end = if low <= high { self.permitted(1, next).clamp(low, high) } else { 0.5 * (low + high) };
+        let (rows, length, entry) = (self.limits.rows(), node.length, self.permitted(1, next));
+        let x_end = if allows(&node.right, &next.left, rows, length, (x, entry), SLACK) {
+            entry
+        } else {
+            let (low, high) = exits(&node.right, &next.left, rows, length, x);
+            if low <= high { entry.clamp(low, high) } else { 0.5 * (low + high) }
+        };
         self.is_brief(node.length, x_end).then_some(x_end)
     }
 
@@ -403,25 +451,24 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             self.setpoint.joint_velocity = Default::default();
             return Ok(());
         };
-        let (piece, s) = (node.piece, node.s + self.executor.sigma);
-        let Some((point, piece)) = self.pose_at(piece, s) else { return Ok(()) };
-        let speed = sqrt(self.executor.x);
-        let pose = Pose::from_array(point.position);
-        let velocity = Pose::from_array(point.first.map(|d| d * speed));
-        let motion = self.kinematics.motion(&pose, &velocity, &Pose::ZERO);
-        let motion = motion.map_err(|error| PlanError {
-            kind: PlanErrorKind::Unreachable(error),
-            span: piece.span,
-            pose,
+        let index = node.piece.wrapping_sub(self.first_piece) as usize;
+        let Some(piece) = self.pieces.get(index) else { return Ok(()) };
+        let Executor { sigma, v: speed, place, motion, .. } = &mut self.executor;
+        let s = node.s + *sigma;
+        piece.geometry.look(s, place);
+        let first = place.first.to_array();
+        let velocity = Pose::from_array(first.map(|d| d * *speed));
+        self.kinematics.motion_into(&place.pose, &velocity, &Pose::ZERO, motion).map_err(|error| {
+            PlanError { kind: PlanErrorKind::Unreachable(error), span: piece.span, pose: place.pose }
         })?;
         self.setpoint = Setpoint {
-            pose,
+            pose: place.pose,
             joints: motion.position,
             joint_velocity: if at_rest { Default::default() } else { motion.velocity },
             motion: piece.motion,
             s,
             blending: piece.corner,
-            feed_use: piece.feed_use(&point.first, speed),
+            feed_use: piece.feed_use(&first, *speed),
             span: piece.span,
             state,
             starved: self.starved,

@@ -6,7 +6,7 @@
 
 use crate::PlanError;
 use crate::interval::fastest_entry;
-use crate::limits::{FASTEST, Rows, Sample};
+use crate::limits::{FASTEST, Rows, Sample, Spot};
 use crate::operator::Panel;
 use crate::pair::{higher, lower};
 use crate::path::Geometry;
@@ -109,9 +109,9 @@ pub(crate) struct Grid<const R: usize> {
     after_step: f64,
     /// No step on this piece is longer: what turns looks the same a turn later.
     longest: f64,
-    /// At the last node, and at the place that may become the next; the first of them is that of the last node if `swapped` is false.
-    samples: [Sample<R>; 2],
-    swapped: bool,
+    look: Look<R>,
+    /// `distance` of the last nodes set.
+    recent: [f64; NODES_PER_TICK],
     /// Nodes from the front on that the look-ahead has planned; the last of them as a stop.
     pub(crate) planned: usize,
     /// How many of them the last pass had to plan again.
@@ -125,6 +125,24 @@ pub(crate) struct Grid<const R: usize> {
     before: Panel,
     /// The look-ahead under way.
     pass: Option<Pass>,
+}
+
+/// Where the path was looked at last.
+#[derive(Debug, Clone)]
+struct Look<const R: usize> {
+    /// At the last node, and at the place that may become the next; the first of them is that of the last node if `swapped` is false.
+    samples: [Sample<R>; 2],
+    swapped: bool,
+    spot: Spot,
+}
+
+impl<const R: usize> Look<R> {
+    /// At the last node, and at the place that may become the next; and what looks at it.
+    #[inline]
+    fn samples(&mut self) -> (&mut Sample<R>, &mut Sample<R>, &mut Spot) {
+        let [a, b] = &mut self.samples;
+        if self.swapped { (b, a, &mut self.spot) } else { (a, b, &mut self.spot) }
+    }
 }
 
 /// A backward pass: from a stop at the last of `end` nodes to where nothing changes any more. It may rest between any
@@ -154,8 +172,8 @@ impl<const R: usize> Grid<R> {
             step: f64::INFINITY,
             after_step: f64::INFINITY,
             longest: f64::INFINITY,
-            samples: [Sample::EMPTY; 2],
-            swapped: false,
+            look: Look { samples: [Sample::EMPTY; 2], swapped: false, spot: Spot::NONE },
+            recent: [f64::NEG_INFINITY; NODES_PER_TICK],
             planned: 0,
             depth: 0,
             settled: f64::NEG_INFINITY,
@@ -164,12 +182,6 @@ impl<const R: usize> Grid<R> {
             before: Panel::NEUTRAL,
             pass: None,
         }
-    }
-
-    /// At the last node, and at the place that may become the next.
-    fn samples(&mut self) -> (&mut Sample<R>, &mut Sample<R>) {
-        let [a, b] = &mut self.samples;
-        if self.swapped { (b, a) } else { (a, b) }
     }
 
     /// True while the look-ahead has not finished what it began.
@@ -189,11 +201,16 @@ impl<const R: usize> Grid<R> {
         }
     }
 
+    /// True if all that is planned was planned with what is set now.
+    #[inline]
+    pub(crate) fn is_planned_with(&self, now: Panel) -> bool {
+        self.current == now && self.fresh == self.planned && self.pass.is_none()
+    }
+
     /// The share of its planned entry at which node `index` may be passed now.
     #[inline]
     pub(crate) fn share(&self, index: usize, now: Panel) -> f64 {
-        // As a rule all was planned with what is set.
-        if self.current == now && self.fresh == self.planned && self.pass.is_none() {
+        if self.is_planned_with(now) {
             return 1.0;
         }
         let planned = match self.pass {
@@ -232,12 +249,11 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 break;
             }
             let Some(&Piece { to, open, .. }) = self.piece(self.grid.piece) else { break };
-            if self.grid.s < to && !self.nodes.is_empty() {
-                self.march()?;
-                room -= 1;
-            } else if self.nodes.is_empty() {
+            if self.nodes.is_empty() {
                 self.first_node()?;
                 room -= 1;
+            } else if self.grid.s < to {
+                room -= self.march(room)?;
             } else if open || !self.next_piece()? {
                 break;
             }
@@ -249,8 +265,9 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         let index = self.grid.piece.wrapping_sub(self.first_piece) as usize;
         let Some(piece) = self.pieces.get(index) else { return Ok(()) };
         let (number, longest) = (self.grid.piece, piece.geometry.longest_step());
-        let (sample, _) = self.grid.samples();
-        self.limits.sample(&self.kinematics, piece, piece.from, sample)?;
+        let (sample, _, spot) = self.grid.look.samples();
+        spot.look(piece, piece.from);
+        self.limits.sample(&self.kinematics, piece, spot, sample)?;
         let caps = Caps { hard: sample.hard, feed: sample.feed, rapid: piece.rapid };
         let node = Node {
             piece: number,
@@ -271,14 +288,10 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.grid.after_step = f64::INFINITY;
         self.grid.longest = longest;
         self.work.samples += 1;
-        self.add(node);
-        Ok(())
-    }
-
-    fn add(&mut self, node: Node<R>) {
         // `cut` goes on only while there is room.
         let _ = self.nodes.push_back(node);
         self.work.nodes += 1;
+        Ok(())
     }
 
     /// The end of a piece: what begins here joins the last node. False if nothing follows yet.
@@ -293,14 +306,16 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         // A new source line is a new block; a dwell always is.
         let block = still || span.is_some_and(|span| !is_same_block(span, next.span));
         if !still {
-            self.limits.sample(&self.kinematics, next, from, self.grid.samples().0)?;
+            let (sample, _, spot) = self.grid.look.samples();
+            spot.look(next, from);
+            self.limits.sample(&self.kinematics, next, spot, sample)?;
         }
         let Some(tail) = self.nodes.back_mut() else { return Ok(false) };
         tail.stop |= stop || still;
         tail.dwell_ns += dwell_ns;
         tail.blocks = tail.blocks.saturating_add(u8::from(block));
         if !still {
-            let (sample, _) = self.grid.samples();
+            let (sample, ..) = self.grid.look.samples();
             tail.right = sample.rows;
             tail.piece = number;
             tail.s = from;
@@ -313,80 +328,91 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         Ok(true)
     }
 
-    /// One interval further along a piece.
-    fn march(&mut self) -> Result<(), PlanError> {
-        let index = self.grid.piece.wrapping_sub(self.first_piece) as usize;
-        let Some(piece) = self.pieces.get(index) else { return Ok(()) };
+    /// At least one interval and at most `room` further along a piece; how many.
+    #[inline(never)]
+    fn march(&mut self, room: usize) -> Result<usize, PlanError> {
+        let number = self.grid.piece;
+        let index = number.wrapping_sub(self.first_piece) as usize;
+        let Some(piece) = self.pieces.get(index) else { return Ok(room) };
         let rows = self.limits.rows();
-        let (number, start) = (self.grid.piece, self.grid.s);
-        let remaining = piece.to - start;
-        self.work.samples += 1;
-        let guess = self.grid.step;
-        let mut step = even(remaining, lower(guess, self.grid.longest));
-        let period = self.settings.servo_period_s;
-        let (last, sample) = self.grid.samples();
-        self.limits.sample(&self.kinematics, piece, start + step, sample)?;
-        let mut next_guess = guess;
-        for _ in 0..60 {
-            let scales = last.variation(sample, rows);
-            let shortest = period * sqrt(scales.speed) / NODES_PER_PERIOD;
-            if step <= shortest || scales.change <= CHANGE {
-                // What would have been right here is right for the next, or nearly so.
-                next_guess = higher(0.75 * shortest, step * lower(4.0, 0.9 * CHANGE / scales.change));
-                // A short piece says little of what the path could bear; a straight one nothing.
-                if step >= remaining || scales.change == 0.0 {
-                    next_guess = higher(next_guess, guess);
+        let brief = self.settings.servo_period_s / NODES_PER_PERIOD;
+        let per_period = 1.0 / self.settings.servo_period_s;
+        let mut set = 0;
+        while set < room {
+            set += 1;
+            let start = self.grid.s;
+            let remaining = piece.to - start;
+            let guess = self.grid.step;
+            let mut step = even(remaining, lower(guess, self.grid.longest));
+            let mut next_guess = guess;
+            let (last, sample, spot) = self.grid.look.samples();
+            for shortened in 0..=60 {
+                self.work.samples += 1;
+                spot.look_on(piece, start + step);
+                self.limits.sample(&self.kinematics, piece, spot, sample)?;
+                let scales = last.variation(sample, rows);
+                let right = CHANGE * scales.unit;
+                // Compared as squares: the root is seldom needed.
+                let shortest_2 = brief * brief * scales.x;
+                if step * step <= shortest_2 || scales.change <= right {
+                    // What would have been right here is right for the next, or nearly so.
+                    next_guess = step * lower(4.0, 0.9 * right / scales.change);
+                    if next_guess * next_guess < 0.75 * 0.75 * shortest_2 {
+                        next_guess = 0.75 * sqrt(shortest_2);
+                    }
+                    // A short piece says little of what the path could bear; a straight one nothing.
+                    if step >= remaining || scales.change == 0.0 {
+                        next_guess = higher(next_guess, guess);
+                    }
+                    break;
                 }
+                // Change grows about linearly with the step; never below what is needed.
+                let by_change = step * (0.9 * right / scales.change).clamp(0.1, 1.0);
+                let shorter = even(remaining, by_change.max(0.5 * sqrt(shortest_2)).min(0.75 * step));
+                if !(shorter < step) || shortened == 60 {
+                    break;
+                }
+                step = shorter;
+            }
+            let between = self.limits.between(last, sample, step, piece, start)?;
+            let s = if step >= remaining { piece.to } else { start + step };
+            let Some(tail) = self.nodes.back_mut() else { return Ok(room) };
+            tail.length = step;
+            let hard = lower(tail.after.hard, between);
+            tail.after.hard = hard;
+            if start > piece.from {
+                // What else it holds is the same on both sides.
+                tail.before.hard = hard;
+            }
+            let distance = tail.distance + step;
+            let recent = &mut self.grid.recent[self.work.nodes as usize % NODES_PER_TICK];
+            let most = (distance - core::mem::replace(recent, distance)) * per_period;
+            let caps = Caps { hard: lower(between, most * most), feed: sample.feed, rapid: piece.rapid };
+            // `cut` asks for no more than there is room for.
+            let _ = self.nodes.push_back(Node {
+                piece: number,
+                s,
+                length: 0.0,
+                entry: 0.0,
+                before: caps,
+                after: caps,
+                stop: false,
+                dwell_ns: 0,
+                blocks: 0,
+                left: sample.rows,
+                right: sample.rows,
+                distance,
+            });
+            self.work.nodes += 1;
+            self.grid.s = s;
+            self.grid.step = self.grid.after_step;
+            self.grid.after_step = next_guess;
+            self.grid.look.swapped = !self.grid.look.swapped;
+            if !(s < piece.to) {
                 break;
             }
-            // Change grows about linearly with the step; never below what is needed.
-            let by_change = step * (0.9 * CHANGE / scales.change).clamp(0.1, 1.0);
-            let shorter = even(remaining, by_change.max(0.5 * shortest).min(0.75 * step));
-            if !(shorter < step) {
-                break;
-            }
-            step = shorter;
-            self.work.samples += 1;
-            self.limits.sample(&self.kinematics, piece, start + step, sample)?;
         }
-        let at_end = step >= remaining;
-        let between = self.limits.between(last, sample, step, piece, start)?;
-        let s = if at_end { piece.to } else { start + step };
-        let Some(tail) = self.nodes.back_mut() else { return Ok(()) };
-        tail.length = step;
-        tail.after.hard = lower(tail.after.hard, between);
-        if start > piece.from {
-            tail.before = tail.after;
-        }
-        let distance = tail.distance + step;
-        let mut hard = between;
-        if let Some(earlier) = self.nodes.len().checked_sub(NODES_PER_TICK)
-            && let Some(earlier) = self.nodes.get(earlier)
-        {
-            let speed = (distance - earlier.distance) / period;
-            hard = lower(hard, speed * speed);
-        }
-        let caps = Caps { hard, feed: sample.feed, rapid: piece.rapid };
-        let node = Node {
-            piece: number,
-            s,
-            length: 0.0,
-            entry: 0.0,
-            before: caps,
-            after: caps,
-            stop: false,
-            dwell_ns: 0,
-            blocks: 0,
-            left: sample.rows,
-            right: sample.rows,
-            distance,
-        };
-        self.add(node);
-        self.grid.s = s;
-        self.grid.step = self.grid.after_step;
-        self.grid.after_step = next_guess;
-        self.grid.swapped = !self.grid.swapped;
-        Ok(())
+        Ok(set)
     }
 
     /// Plans at most `budget` nodes, as far ahead as what the machine comes to soon depends on; the rest waits.
@@ -519,7 +545,18 @@ fn is_same_block(a: Span, b: Span) -> bool {
     (a.file, a.line) == (b.file, b.line)
 }
 
-/// The largest step ≤ `step` that divides `remaining` evenly.
+/// `step`, or towards the end of a piece the largest step below it that divides what `remain`s evenly.
+#[inline(always)]
 fn even(remaining: f64, step: f64) -> f64 {
-    if step >= remaining { remaining } else { remaining / pkm_kins::maths::ceil(remaining / step) }
+    const STEPS: f64 = 8.0;
+    if step >= remaining {
+        return remaining;
+    }
+    if STEPS * step < remaining {
+        return step;
+    }
+    let steps = remaining / step;
+    // Rounded up; what does not fit is not rounded.
+    let whole = steps as i64 as f64;
+    remaining / if whole < steps { whole + 1.0 } else { whole }
 }

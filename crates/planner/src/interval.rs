@@ -23,6 +23,24 @@ fn borders<const R: usize>(
     }
 }
 
+/// True if all strips allow to go from `x` to `x_next`; `slack` is for rounding.
+#[inline(always)]
+pub(crate) fn allows<const R: usize>(
+    left: &Rows<R>,
+    right: &Rows<R>,
+    rows: usize,
+    length: f64,
+    (x, x_next): (f64, f64),
+    slack: f64,
+) -> bool {
+    let h = 2.0 * length;
+    let mut widest = [0.0; 2];
+    borders(left, right, rows, h, |a, b| {
+        widest = with(widest, with(a, b, |a, b| (a * x + b * x_next).abs()), higher);
+    });
+    highest(widest) <= h * (1.0 + slack)
+}
+
 /// A pair of borders x′ = slope·x ± half.
 #[derive(Clone, Copy)]
 struct Lines {
@@ -88,13 +106,7 @@ pub(crate) fn fastest_entry<const R: usize>(
     let h = 2.0 * length;
     let mut x = cap;
     // As a rule the highest x′ asked for is the one.
-    let reached = |x: f64| {
-        let mut widest = [0.0; 2];
-        borders(left, right, rows, h, |a, b| {
-            widest = with(widest, with(a, b, |a, b| (a * x + b * next_cap).abs()), higher);
-        });
-        highest(widest) <= h * (1.0 + 1e-12)
-    };
+    let reached = |x: f64| allows(left, right, rows, length, (x, next_cap), 1e-12);
     if reached(x) {
         return x;
     }
@@ -143,6 +155,10 @@ pub(crate) fn fastest_entry<const R: usize>(
     x
 }
 
+/// Where a joint's q′ passes zero, b is all rounding and so is the room at the limit: without a little slack their
+/// quotient is anything.
+pub(crate) const SLACK: f64 = 1e-9;
+
 /// The range of x′ that the strips allow when the interval is entered with `x`. `low` may lie above `high` by
 /// rounding only, as long as `x` does not exceed [`fastest_entry`].
 pub(crate) fn exits<const R: usize>(
@@ -152,9 +168,6 @@ pub(crate) fn exits<const R: usize>(
     length: f64,
     x: f64,
 ) -> (f64, f64) {
-    // Where a joint's q′ passes zero, b is all rounding and so is the room at the limit: without a little slack their
-    // quotient is anything.
-    const SLACK: f64 = 1e-9;
     // The negative of `high` is a maximum too: one and the same operation for all.
     let (mut low, mut minus_high) = ([0.0; 2], [f64::NEG_INFINITY; 2]);
     let h = 2.0 * length;

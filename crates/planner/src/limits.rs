@@ -4,11 +4,11 @@
 //! x = ṡ², its speed is |q′|√x and its acceleration q′ s̈ + q″ x. Rows are stored divided by their acceleration
 //! limit, so each asks for |d₁ s̈ + d₂ x| ≤ 1. (Bobrow, Dubowsky, Gibson 1985; Pham & Pham, TOPP-RA, 2018.)
 
-use crate::pair::{Pair, higher, highest, lower, with};
-use crate::path::{FeedGroup, feed_length};
+use crate::pair::{Pair, each, higher, highest, lower, two, two_mut, with};
+use crate::path::{FeedGroup, Place, feed_length};
 use crate::planner::Piece;
 use crate::{PlanError, PlanErrorKind};
-use pkm_kins::{Axis, InverseError, JointRange, Joints, Kinematics, MAX_JOINTS, Pose};
+use pkm_kins::{Axis, InverseError, JointMotion, JointRange, Joints, Kinematics, MAX_JOINTS, Pose};
 
 /// Plans are made to this share of every limit, so that what happens between two nodes (measured: 3e-4 more than at
 /// the nodes) stays within the limit itself. Costs 0.03 % of the time.
@@ -188,34 +188,47 @@ impl<const R: usize> Limits<R> {
     ///
     /// # Errors
     /// The point is out of reach, out of travel or too near a singularity.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn sample<K: Kinematics>(
         &self,
         kinematics: &K,
         piece: &Piece,
-        s: f64,
+        spot: &mut Spot,
         sample: &mut Sample<R>,
     ) -> Result<(), PlanError> {
-        let point = piece.geometry.at(s);
-        let pose = Pose::from_array(point.position);
-        let (first, second) = (Pose::from_array(point.first), Pose::from_array(point.second));
-        let fail = |kind| PlanError { kind, span: piece.span, pose };
-        // By reference: to move it out costs a tenth of this function.
-        let motion = &kinematics.motion(&pose, &first, &second);
-        let motion = motion.as_ref().map_err(|&error| fail(PlanErrorKind::Unreachable(error)))?;
+        let Spot { place: Place { pose, first, second }, feed, motion } = spot;
+        let fail = |kind| PlanError { kind, span: piece.span, pose: *pose };
+        kinematics
+            .motion_into(pose, first, second, motion)
+            .map_err(|error| fail(PlanErrorKind::Unreachable(error)))?;
         if self.singularity_guard > 0.0 {
-            self.check_travel(&pose, &motion.position).map_err(fail)?;
-            let measure = kinematics.singularity(&pose).map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
+            self.check_travel(pose, &motion.position).map_err(fail)?;
+            let measure = kinematics.singularity(pose).map_err(|e| fail(PlanErrorKind::Unreachable(e)))?;
             let nearest = measure.inverse.min(measure.forward);
             if !(nearest >= self.singularity_guard) {
                 return Err(fail(PlanErrorKind::Unreachable(InverseError::Singular { measure: nearest })));
             }
         }
-        sample.feed = piece.feed.cap(&point.first);
-        if let Some(onto) = &piece.onto {
-            sample.feed = lower(sample.feed, onto.cap(&point.first));
+        sample.feed = *feed;
+        let (mut fastest, mut within) = ([0.0; 2], true);
+        let joints = self.joints.len().min(R).min(MAX_JOINTS);
+        // Joints two by two; there are no more than rows: that it is said here spares the loop its checks.
+        let pairs = (joints / 2).min(R / 2);
+        let (q, d1, d2) = (two(&motion.position), two(&motion.velocity), two(&motion.acceleration));
+        let (per_velocity, per_acceleration) = (two(&self.per_velocity), two(&self.per_acceleration));
+        let (lowest, highest_place) = (two(&self.lowest), two(&self.highest));
+        for k in 0..pairs {
+            let times = |a: Pair, b: Pair| with(a, b, |a, b| a * b);
+            let speed = times(d1[k], per_velocity[k]);
+            two_mut(&mut sample.rows.first)[k] = times(d1[k], per_acceleration[k]);
+            two_mut(&mut sample.rows.second)[k] = times(d2[k], per_acceleration[k]);
+            two_mut(&mut sample.speed)[k] = speed;
+            two_mut(&mut sample.position)[k] = q[k];
+            fastest = with(fastest, each(speed, f64::abs), higher);
+            let (low, high) = (lowest[k], highest_place[k]);
+            within &= q[k][0] >= low[0] && q[k][1] >= low[1] && q[k][0] <= high[0] && q[k][1] <= high[1];
         }
-        let (mut fastest, mut within) = (0.0, true);
+        let mut fastest = highest(fastest);
         let mut set = |row: usize, q: f64, d1: f64, d2: f64| {
             let speed = d1 * self.per_velocity[row];
             sample.rows.first[row] = d1 * self.per_acceleration[row];
@@ -225,9 +238,7 @@ impl<const R: usize> Limits<R> {
             fastest = higher(fastest, speed.abs());
             within &= q >= self.lowest[row] && q <= self.highest[row];
         };
-        // There are no more joints than rows; that it is said here spares the loop its checks.
-        let joints = self.joints.len().min(R).min(MAX_JOINTS);
-        for row in 0..joints {
+        for row in 2 * pairs..joints {
             set(row, motion.position[row], motion.velocity[row], motion.acceleration[row]);
         }
         for (limits, row) in self.axes.iter().zip(joints..R) {
@@ -235,7 +246,7 @@ impl<const R: usize> Limits<R> {
             set(row, pose.get(axis), first.get(axis), second.get(axis));
         }
         sample.hard = speed_cap(fastest);
-        if within { Ok(()) } else { self.check_travel(&pose, &motion.position).map_err(fail) }
+        if within { Ok(()) } else { self.check_travel(pose, &motion.position).map_err(fail) }
     }
 }
 
@@ -315,7 +326,7 @@ impl Feed {
         if self.speed > 0.0 { feed_length(first, self.group) * speed / self.speed } else { 0.0 }
     }
 
-    fn cap(&self, first: &[f64; 9]) -> f64 {
+    pub(crate) fn cap(&self, first: &[f64; 9]) -> f64 {
         if self.speed == f64::INFINITY {
             return f64::INFINITY;
         }
@@ -337,6 +348,42 @@ impl<const R: usize> Rows<R> {
     pub(crate) fn pairs(&self, rows: usize) -> impl Iterator<Item = (Pair, Pair)> {
         let (first, second) = (self.first.as_chunks().0, self.second.as_chunks().0);
         first.iter().copied().zip(second.iter().copied()).take(rows.div_ceil(2))
+    }
+}
+
+/// Where a piece is looked at just now.
+#[derive(Debug, Clone)]
+pub(crate) struct Spot {
+    place: Place,
+    /// Cap on x from the feed at 100 %.
+    feed: f64,
+    motion: JointMotion,
+}
+
+impl Spot {
+    pub(crate) const NONE: Self = Self {
+        place: Place::ZERO,
+        feed: 0.0,
+        motion: JointMotion {
+            position: [0.0; MAX_JOINTS],
+            velocity: [0.0; MAX_JOINTS],
+            acceleration: [0.0; MAX_JOINTS],
+        },
+    };
+
+    /// A first look at a piece.
+    #[inline]
+    pub(crate) fn look(&mut self, piece: &Piece, s: f64) {
+        piece.geometry.look(s, &mut self.place);
+        self.feed = piece.feed_cap(&self.place.first);
+    }
+
+    /// Another look at the same one.
+    #[inline]
+    pub(crate) fn look_on(&mut self, piece: &Piece, s: f64) {
+        if !piece.geometry.look_on(s, &mut self.place) {
+            self.feed = piece.feed_cap(&self.place.first);
+        }
     }
 }
 
@@ -363,7 +410,6 @@ impl<const R: usize> Sample<R> {
     };
 
     /// How much the strips change between two points, in shares of the limits: the measure that spaces the nodes.
-    /// Also returns x̂, the scale of speed there.
     #[inline(always)]
     pub(crate) fn variation(&self, other: &Self, rows: usize) -> Scales {
         let (mut steepest, mut bend) = ([0.0; 2], [0.0; 2]);
@@ -373,22 +419,26 @@ impl<const R: usize> Sample<R> {
             bend = with(bend, with(a2, b2, largest), higher);
         }
         let (steepest, bend) = (highest(steepest), highest(bend));
-        let by_bend = if bend * FASTEST > 2.0 { 2.0 / bend } else { FASTEST };
-        let speed = lower(lower(self.hard, other.hard), lower(lower(self.feed, other.feed), by_bend));
-        let acceleration = if steepest > 0.0 { 1.0 / steepest } else { FASTEST };
+        let cap = lower(lower(self.hard, other.hard), lower(self.feed, other.feed));
+        let x = if bend * cap > 2.0 { 2.0 / bend } else { cap };
+        let unit = higher(steepest, 1.0 / FASTEST);
+        let per_bend = x * unit;
         let mut change = [0.0; 2];
         for ((a1, a2), (b1, b2)) in self.rows.pairs(rows).zip(other.rows.pairs(rows)) {
-            let steeper = with(a1, b1, |a, b| (b - a).abs() * acceleration);
-            let bent = with(a2, b2, |a, b| (b - a).abs() * speed);
+            let steeper = with(a1, b1, |a, b| (b - a).abs());
+            let bent = with(a2, b2, |a, b| (b - a).abs() * per_bend);
             change = with(change, with(steeper, bent, |steeper, bent| steeper + bent), higher);
         }
-        Scales { change: highest(change), speed }
+        Scales { change: highest(change), unit, x }
     }
 }
 
 /// See [`Sample::variation`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scales {
+    /// The largest change of a strip, where `unit` is all of its limit.
     pub(crate) change: f64,
-    pub(crate) speed: f64,
+    pub(crate) unit: f64,
+    /// x̂, the scale of speed.
+    pub(crate) x: f64,
 }

@@ -3,6 +3,18 @@
 /// The same quantity of two neighbouring rows.
 pub(crate) type Pair = [f64; 2];
 
+/// Two by two; an odd last one is left out.
+#[inline(always)]
+pub(crate) fn two(all: &[f64]) -> &[Pair] {
+    all.as_chunks().0
+}
+
+/// Likewise, to be written.
+#[inline(always)]
+pub(crate) fn two_mut(all: &mut [f64]) -> &mut [Pair] {
+    all.as_chunks_mut().0
+}
+
 /// `f` of both.
 #[inline(always)]
 pub(crate) fn each(a: Pair, f: impl Fn(f64) -> f64) -> Pair {

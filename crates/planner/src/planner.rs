@@ -6,8 +6,9 @@
 use crate::executor::Executor;
 use crate::grid::{Grid, Node, SET_PER_PUSH};
 use crate::limits::{Feed, Limits};
+use crate::pair::lower;
 use crate::path::{Blend, FeedGroup, Geometry, Tolerance, Vector, combine};
-use crate::{PlanError, PlanErrorKind, path, walk};
+use crate::{PlanError, PlanErrorKind, walk};
 use core::ops::ControlFlow;
 use heapless::Deque;
 use pkm_canon::Span;
@@ -138,6 +139,14 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
+    /// Cap on x from the feed at 100 %; infinite for rapids.
+    #[inline]
+    pub(crate) fn feed_cap(&self, first: &Pose) -> f64 {
+        let first = first.to_array();
+        let cap = self.feed.cap(&first);
+        self.onto.as_ref().map_or(cap, |onto| lower(cap, onto.cap(&first)))
+    }
+
     /// The feed at ṡ = `speed`, as a share of what was asked for.
     pub(crate) fn feed_use(&self, first: &Vector, speed: f64) -> f64 {
         let share = |feed: &Feed| feed.share(first, speed);
@@ -463,11 +472,6 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.starved = false;
         self.end = self.setpoint.pose.to_array();
         self.end_rows = None;
-    }
-
-    pub(crate) fn pose_at(&self, piece: u64, s: f64) -> Option<(path::Point, &Piece)> {
-        let piece = self.piece(piece)?;
-        Some((piece.geometry.at(s), piece))
     }
 }
 

@@ -16,7 +16,7 @@
 //! rest on the target are n² A T²/2 away with speed n A T; between them the border is straight. Each period the speed is chosen
 //! that is on that border at its end. No limit is exceeded, nothing overshoots, and rest is met exactly.
 
-use crate::limits::{Feed, Limits, Sample};
+use crate::limits::{Feed, Limits, Sample, Spot};
 use crate::path::{Blend, FeedGroup, Geometry, combine};
 use crate::planner::{PathMode, Piece, Setpoint, State};
 use crate::{PlanError, PlanErrorKind};
@@ -541,12 +541,13 @@ fn pace<K: Kinematics, const R: usize>(
         motion: step.motion,
         span: step.span,
     };
-    let mut sample = Sample::EMPTY;
+    let (mut sample, mut spot) = (Sample::EMPTY, Spot::NONE);
     let mut pace = Pace { speed: f64::INFINITY, acceleration: f64::INFINITY };
     let count = ((to - from) / SPACING).clamp(SAMPLES.0, SAMPLES.1) as u32;
     for i in 0..=count {
         let s = if i == count { to } else { from + (to - from) * f64::from(i) / f64::from(count) };
-        limits.sample(kinematics, &piece, s, &mut sample)?;
+        spot.look(&piece, s);
+        limits.sample(kinematics, &piece, &mut spot, &mut sample)?;
         let bend = sample.rows.second.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
         // Half of every acceleration is kept for the bends.
         let x = if bend * sample.hard > 0.5 { 0.5 / bend } else { sample.hard };

@@ -5,7 +5,7 @@
 use crate::PlanErrorKind;
 use crate::limits::Limits;
 use crate::pair::{higher, highest, with};
-use crate::path::Geometry;
+use crate::path::{Geometry, Place};
 use core::ops::ControlFlow;
 use pkm_kins::{InverseError, Kinematics, Pose, Singularity};
 
@@ -41,22 +41,23 @@ impl<const R: usize> Limits<R> {
         let mut known = usize::from(start.is_some());
         let mut last = [start.unwrap_or([0.0; R]); 2];
         let mut middle = Pose::ZERO;
+        let mut place = Place::ZERO;
+        geometry.look(0.0, &mut place);
         for k in u32::from(start.is_some())..=places {
             let s = if k == places { length } else { length * f64::from(k) / f64::from(places) };
-            let point = geometry.at(s);
-            let pose = Pose::from_array(point.position);
-            let (first, second) = (Pose::from_array(point.first), Pose::from_array(point.second));
+            geometry.look_on(s, &mut place);
+            let Place { pose, first, second } = &place;
             // Not the place alone: an axis may be locked, a form switch too near to be passed.
-            let looked = kinematics.passage(&pose, &first, &second).map_err(PlanErrorKind::Unreachable);
+            let looked = kinematics.passage(pose, first, second).map_err(PlanErrorKind::Unreachable);
             let found = looked.and_then(|joints| {
-                let rows = self.row_values(&pose, &joints);
+                let rows = self.row_values(pose, &joints);
                 self.check_rows(&rows)?;
                 if !measure && !(self.singularity_guard > 0.0) {
                     let far =
                         Singularity { inverse: f64::INFINITY, inverse_joint: 0, forward: f64::INFINITY };
                     return Ok((rows, far));
                 }
-                let near = kinematics.singularity(&pose).map_err(PlanErrorKind::Unreachable)?;
+                let near = kinematics.singularity(pose).map_err(PlanErrorKind::Unreachable)?;
                 let measure = near.inverse.min(near.forward);
                 if self.singularity_guard > 0.0 && !(measure >= self.singularity_guard) {
                     return Err(PlanErrorKind::Unreachable(InverseError::Singular { measure }));
@@ -80,8 +81,8 @@ impl<const R: usize> Limits<R> {
                     Err(kind)
                 }
             };
-            middle = pose;
-            if each(&pose, outcome).is_break() {
+            middle = *pose;
+            if each(pose, outcome).is_break() {
                 return None;
             }
         }

@@ -1,7 +1,7 @@
 //! Circular arc, helix and spiral in any plane of XYZ; the other coordinates go linearly with the angle.
 
-use super::{Point, Vector};
-use pkm_kins::maths::{TAU, atan2, cos, sin, sqrt};
+use super::{Point, Vector, combine};
+use pkm_kins::maths::{TAU, atan2, sincos, sqrt};
 
 /// An arc about `base`: XYZ(s) = base + r(s) (u cos θ + v sin θ) + rate s, with θ = ω s and r = r₀ + ρ s.
 /// Unequal end radii (which RS274/NGC tolerates within limits) make a spiral, so the end point is exact.
@@ -85,25 +85,22 @@ impl Arc {
         })
     }
 
+    #[inline]
     pub(super) fn at(&self, s: f64) -> Point {
         let w = self.angle_rate;
-        let (c, d) = (cos(w * s), sin(w * s));
+        let (sine, cosine) = sincos(w * s);
         let (r, rho) = (self.radius_mm + self.radius_rate * s, self.radius_rate);
-        let mut point = Point { position: [0.0; 9], first: self.rate, second: [0.0; 9] };
-        for (i, (base, rate)) in self.base.iter().zip(&self.rate).enumerate() {
-            let (radial, tangential) = match (self.u.get(i), self.v.get(i)) {
-                (Some(u), Some(v)) => (u * c + v * d, v * c - u * d),
-                _ => (0.0, 0.0),
-            };
-            if let Some(p) = point.position.get_mut(i) {
-                *p = base + rate * s + r * radial;
-            }
-            if let Some(p) = point.first.get_mut(i) {
-                *p += rho * radial + r * w * tangential;
-            }
-            if let Some(p) = point.second.get_mut(i) {
-                *p = 2.0 * rho * w * tangential - r * w * w * radial;
-            }
+        let mut point = Point {
+            position: combine(&self.base, &self.rate, |base, rate| base + rate * s),
+            first: self.rate,
+            second: [0.0; 9],
+        };
+        for i in 0..3 {
+            let (u, v) = (self.u[i], self.v[i]);
+            let (radial, tangential) = (u * cosine + v * sine, v * cosine - u * sine);
+            point.position[i] += r * radial;
+            point.first[i] += rho * radial + r * w * tangential;
+            point.second[i] = 2.0 * rho * w * tangential - r * w * w * radial;
         }
         point
     }

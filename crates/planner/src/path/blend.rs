@@ -86,6 +86,7 @@ impl Blend {
         })
     }
 
+    #[inline]
     pub(super) fn at(&self, s: f64) -> Point {
         let [c0, c1, c2, c3] = &self.coefficients;
         let k = 1.0 / self.length;

@@ -30,11 +30,12 @@ impl Line {
     }
 
     #[inline]
+    pub(super) fn position(&self, s: f64) -> Vector {
+        combine(&self.start, &self.direction, |x, d| x + d * s)
+    }
+
+    #[inline]
     pub(super) fn at(&self, s: f64) -> Point {
-        let mut position = self.start;
-        for (x, d) in position.iter_mut().zip(&self.direction) {
-            *x += d * s;
-        }
-        Point { position, first: self.direction, second: [0.0; 9] }
+        Point { position: self.position(s), first: self.direction, second: [0.0; 9] }
     }
 }

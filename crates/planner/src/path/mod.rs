@@ -14,6 +14,7 @@ pub use blend::{Blend, Tolerance};
 pub use line::Line;
 pub use spline::{MAX_ORDER, Spline};
 
+use pkm_kins::Pose;
 use pkm_kins::maths::{self, TAU, sqrt};
 
 const EIGHTH_TURN: f64 = TAU / 8.0;
@@ -30,6 +31,25 @@ pub struct Point {
     pub first: Vector,
     /// d²X/ds²
     pub second: Vector,
+}
+
+/// A point as the kinematics want it.
+#[derive(Debug, Clone)]
+pub(crate) struct Place {
+    pub(crate) pose: Pose,
+    pub(crate) first: Pose,
+    pub(crate) second: Pose,
+}
+
+impl Place {
+    pub(crate) const ZERO: Self = Self { pose: Pose::ZERO, first: Pose::ZERO, second: Pose::ZERO };
+
+    #[inline(always)]
+    fn set(&mut self, point: &Point) {
+        self.pose = Pose::from_array(point.position);
+        self.first = Pose::from_array(point.first);
+        self.second = Pose::from_array(point.second);
+    }
 }
 
 /// Which coordinates the feed counts, for one move. The rule is LinuxCNC's: XYZ if they move, else UVW, else ABC. In a blend
@@ -112,6 +132,33 @@ impl Geometry {
             Geometry::Arc(arc) => arc.at(s),
             Geometry::Blend(blend) => blend.at(s),
             Geometry::Hold(place) => Point { position: *place, first: [0.0; 9], second: [0.0; 9] },
+        }
+    }
+
+    /// The place at s.
+    #[inline]
+    pub(crate) fn look(&self, s: f64, place: &mut Place) {
+        // One by one: a point of any of them would first be put together, then taken apart.
+        match self {
+            Geometry::Line(line) => place.set(&line.at(s)),
+            Geometry::Arc(arc) => place.set(&arc.at(s)),
+            Geometry::Blend(blend) => place.set(&blend.at(s)),
+            Geometry::Hold(_) => place.set(&self.at(s)),
+        }
+    }
+
+    /// From another place of this same geometry to the one at s: on a line only the pose changes. True if no more did.
+    #[inline]
+    pub(crate) fn look_on(&self, s: f64, place: &mut Place) -> bool {
+        match self {
+            Geometry::Line(line) => {
+                place.pose = Pose::from_array(line.position(s));
+                true
+            }
+            _ => {
+                self.look(s, place);
+                false
+            }
         }
     }
 }
