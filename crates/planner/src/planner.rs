@@ -339,7 +339,8 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         if !self.has_room() {
             return Err(PushError::Full);
         }
-        self.finish();
+        self.starved = false;
+        self.release();
         self.append(Piece {
             geometry: Geometry::Hold(self.end),
             from: 0.0,
@@ -359,10 +360,13 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         self.extend(SET_PER_PUSH, 0).map_err(PushError::Plan)
     }
 
-    /// Nothing follows for now: the last move is released to its end, where the machine comes to rest.
+    /// Nothing follows for now: the last move is released to its end, where the machine comes to rest. Called again while the
+    /// machine drives there, it looks farther ahead each time, as a push would.
     pub fn finish(&mut self) {
         self.starved = false;
         self.release();
+        // What is wrong there is kept as the fault.
+        let _ = self.extend(SET_PER_PUSH, 0);
     }
 
     pub(crate) fn release(&mut self) {

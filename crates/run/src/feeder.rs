@@ -272,6 +272,7 @@ impl<'a> Feeder<'a> {
         self.conclude_probing();
         while self.planner.has_room() && !self.is_elsewhere() {
             if self.pending.is_some() {
+                self.planner.finish();
                 if !self.planner.is_idle() || !self.given.is_multiple_of(self.substeps.into()) {
                     return;
                 }

@@ -21,7 +21,7 @@ impl Observer for Nobody {
 }
 
 fn program(text: &str) -> Program {
-    Program::Memory { name: "turns".to_owned(), text: format!("G21 G61 {text}\nM2\n").into_bytes() }
+    Program::Memory { name: "turns".to_owned(), text: format!("G21 G61\n{text}\nM2\n").into_bytes() }
 }
 
 fn machine(name: &str, set: &[&str]) -> Machine {
@@ -72,6 +72,16 @@ fn a_circle_of_many_turns_is_not_slower_than_at_one_speed() {
             );
         }
     }
+}
+
+/// From rest into a blend and an arc of some hundred nodes, with nothing behind them: a pause before it gains nothing.
+#[test]
+fn the_first_move_knows_as_much_of_the_way_as_one_after_a_pause() {
+    let moma = machine("moma-a", &["servo.period_ns=100000"]);
+    let moves = "G0 X0.394 Y-264.9\nG2 X4.045842 Y-266.148052 I1.367 J-1.967 F3000";
+    let [at_once, later] = ["", "G4 P0.1\n"]
+        .map(|pause| driven(&moma, &at(0.0, -265.0), &format!("G64 P0.05\n{pause}{moves}")).duration_s);
+    assert!((later - at_once).abs() < 0.001, "{at_once} s at once, {later} s after a pause");
 }
 
 #[test]
