@@ -595,6 +595,15 @@ impl Kinematics for Planar {
         Ok(())
     }
 
+    #[inline]
+    fn passage(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<Joints, InverseError> {
+        let state = self.solve([pose.x, pose.y])?;
+        self.guard(&state)?;
+        // 0 times a number that is none is none.
+        let still = (velocity.x + velocity.y + acceleration.x + acceleration.y) * 0.0;
+        if still == 0.0 { Ok(joints(state.joints)) } else { Err(InverseError::NotFinite) }
+    }
+
     fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {
         Ok(self.measures(&self.solve([pose.x, pose.y])?))
     }
@@ -688,6 +697,15 @@ macro_rules! planar_kinematics {
                 motion: &mut $crate::JointMotion,
             ) -> Result<(), $crate::InverseError> {
                 self.planar.motion_into(pose, velocity, acceleration, motion)
+            }
+            #[inline]
+            fn passage(
+                &self,
+                pose: &$crate::Pose,
+                velocity: &$crate::Pose,
+                acceleration: &$crate::Pose,
+            ) -> Result<$crate::Joints, $crate::InverseError> {
+                self.planar.passage(pose, velocity, acceleration)
             }
             fn singularity(&self, pose: &$crate::Pose) -> Result<$crate::Singularity, $crate::InverseError> {
                 self.planar.singularity(pose)
