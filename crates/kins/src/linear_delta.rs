@@ -245,23 +245,36 @@ impl Kinematics for LinearDelta {
         Ok(jacobian)
     }
 
-    /// h ḣ = −w·ẇ, h ḧ + ḣ² = −(ẇ² + w·ẅ).
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
+        let mut motion = JointMotion::default();
+        self.motion_into(pose, velocity, acceleration, &mut motion)?;
+        Ok(motion)
+    }
+
+    /// h ḣ = −w·ẇ, h ḧ + ḣ² = −(ẇ² + w·ẅ).
+    #[inline]
+    fn motion_into(
+        &self,
+        pose: &Pose,
+        velocity: &Pose,
+        acceleration: &Pose,
+        motion: &mut JointMotion,
+    ) -> Result<(), InverseError> {
         let rods = self.rods(pose)?;
         self.guard(&rods)?;
         let (v, a) = (velocity, acceleration);
         if !(v.is_finite() && a.is_finite()) {
             return Err(InverseError::NotFinite);
         }
-        let mut motion = JointMotion { position: Self::joints(pose, &rods), ..JointMotion::default() };
-        let each = rods.iter().zip(motion.velocity.iter_mut()).zip(motion.acceleration.iter_mut());
-        for (((w, h), rate), second) in each {
-            let h_v = -(w[0] * v.x + w[1] * v.y) / h;
-            let h_a = -(v.x * v.x + v.y * v.y + w[0] * a.x + w[1] * a.y + h_v * h_v) / h;
-            *rate = v.z + h_v;
-            *second = a.z + h_a;
+        for (joint, (w, h)) in rods.iter().enumerate() {
+            let part = 1.0 / h;
+            let h_v = -(w[0] * v.x + w[1] * v.y) * part;
+            let h_a = -(v.x * v.x + v.y * v.y + w[0] * a.x + w[1] * a.y + h_v * h_v) * part;
+            motion.position[joint] = pose.z + h;
+            motion.velocity[joint] = v.z + h_v;
+            motion.acceleration[joint] = a.z + h_a;
         }
-        Ok(motion)
+        Ok(())
     }
 
     fn singularity(&self, pose: &Pose) -> Result<Singularity, InverseError> {

@@ -4,7 +4,7 @@
     python3 -m venv /tmp/toppra && /tmp/toppra/bin/pip install numpy toppra
     /tmp/toppra/bin/python crates/planner/benches/toppra.py
 
-And toppra's own C++ library, which is on PyPI too, on P01 and P03:
+And toppra's own C++ library, which is on PyPI too, on P01, P03, P10 and P12:
 
     python3 -m venv /tmp/toppra-cpp && /tmp/toppra-cpp/bin/pip install cmeel-toppra cmeel-eigen
     P=$(echo /tmp/toppra-cpp/lib/python3*/site-packages/cmeel.prefix)
@@ -12,9 +12,9 @@ And toppra's own C++ library, which is on PyPI too, on P01 and P03:
     /tmp/toppra/bin/python crates/planner/benches/toppra.py --cpp /tmp/toppra-cpp/bench
 
 Runs `cargo bench --package pkm-planner -- CASE` and toppra in turn, several times, and prints the medians over the rounds;
-in each round toppra's fastest of several. toppra is charged with its solver only (path and constraints are computed before the
-clock starts); the planner with everything: path, kinematics, spacing of the nodes, look-ahead and the planning part of
-every servo tick.
+in each round toppra's fastest of several (its C++: the median of 101). toppra is charged with its solver only (path and
+constraints are computed before the clock starts), its C++ with path and kinematics too; the planner with everything: path,
+kinematics, spacing of the nodes, look-ahead and the planning part of every servo tick.
 
 Cases (mm, s, rad), on n equal intervals a piece, n = max(least, ceil(length / (whole length / 500))):
 P01 line and P03 circle on a MOMA, P04 1000 chords and P05 zigzag with blended corners on it, P10 circle on a linear delta, P12
