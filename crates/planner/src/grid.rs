@@ -378,24 +378,25 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             let s = if step >= remaining { piece.to } else { start + step };
             let Some(tail) = self.nodes.back_mut() else { return Ok(room) };
             tail.length = step;
-            let hard = lower(tail.after.hard, between);
-            tail.after.hard = hard;
+            tail.after.hard = lower(tail.after.hard, between);
             if start > piece.from {
                 // What else it holds is the same on both sides.
-                tail.before.hard = hard;
+                tail.before.hard = lower(tail.before.hard, between);
             }
             let distance = tail.distance + step;
             let recent = &mut self.grid.recent[self.work.nodes as usize % NODES_PER_TICK];
             let most = (distance - core::mem::replace(recent, distance)) * per_period;
-            let caps = Caps { hard: lower(between, most * most), feed: sample.feed, rapid: piece.rapid };
+            let after = Caps { hard: between, feed: sample.feed, rapid: piece.rapid };
+            // That the nodes behind are close holds the interval ahead no further.
+            let before = Caps { hard: lower(between, most * most), ..after };
             // `cut` asks for no more than there is room for.
             let _ = self.nodes.push_back(Node {
                 piece: number,
                 s,
                 length: 0.0,
                 entry: 0.0,
-                before: caps,
-                after: caps,
+                before,
+                after,
                 stop: false,
                 dwell_ns: 0,
                 blocks: 0,

@@ -36,7 +36,11 @@ fn driven(moves: &str) -> (f64, [f64; 2]) {
 
 /// The same in this path mode; no joint is over its limits.
 fn driven_in(mode: &str, moves: &str) -> (f64, [f64; 2]) {
-    let machine = Machine::load("xyzabc", &[]).expect("a shipped machine");
+    driven_on("xyzabc", mode, moves)
+}
+
+fn driven_on(machine: &str, mode: &str, moves: &str) -> (f64, [f64; 2]) {
+    let machine = Machine::load(machine, &[]).expect("a shipped machine");
     let text = format!("G21 G91 G94 {mode}\n{moves}\nM2\n").into_bytes();
     let program = Program::Memory { name: "feeds".to_owned(), text };
     let looks_on = |_: &_| Speeds::default();
@@ -67,6 +71,15 @@ fn a_slow_move_does_not_hold_back_its_neighbours() {
     // A gentle corner is long: P allows it half of either line.
     takes("G1 X10 F600\nG1 X10 Y0.005 F60", 1.0 + 10.0);
     takes("G1 X10 F60\nG1 X10 Y0.005 F600", 10.0 + 1.0);
+}
+
+/// Hundreds of nodes within a tenth of a micrometre, and behind them a line of two micrometres with two.
+#[test]
+fn what_a_slow_move_is_cut_into_does_not_hold_back_the_next() {
+    let moves = "G1 X0.000091 F0.1\nG1 X-0.0002638 Y-0.00214 F3000";
+    let (duration_s, _) = driven_on("moma-a", "G64 P0.05", moves);
+    // 48.7 ms up to the middle of the corner, then 3.2 ms.
+    assert!(duration_s <= 0.055, "{duration_s} s");
 }
 
 #[test]
