@@ -132,11 +132,15 @@ pub(crate) fn planned(
 /// How much more of a limit the verdict tries.
 const MORE: f64 = 1.1;
 
-/// Seconds by limit, and lost.
+/// Servo periods by limit, and lost: their sums are exact, as those of seconds are not.
 #[derive(Default)]
 struct Book {
-    spent_s: BTreeMap<Limited, f64>,
-    lost_s: BTreeMap<Limited, f64>,
+    spent: BTreeMap<Limited, f64>,
+    lost: BTreeMap<Limited, f64>,
+}
+
+fn seconds(machine: &Machine, periods: f64) -> f64 {
+    periods * machine.servo_period_ns as f64 / 1e9
 }
 
 /// A program driven without the HAL.
@@ -151,11 +155,11 @@ struct Driven {
 }
 
 impl Driven {
-    /// Over all blocks, each limit wherever it was met.
+    /// Over all blocks, each limit wherever it was met; servo periods.
     fn causes(&self, of: fn(&Book) -> &BTreeMap<Limited, f64>) -> BTreeMap<Limited, f64> {
         let mut causes = BTreeMap::new();
-        for (limit, seconds) in self.blocks.values().flat_map(of) {
-            *causes.entry(limit.cause()).or_default() += seconds;
+        for (limit, periods) in self.blocks.values().flat_map(of) {
+            *causes.entry(limit.cause()).or_default() += periods;
         }
         causes
     }
@@ -176,19 +180,26 @@ fn fill(
     let mut longest_loss = (0.0, 0);
     for (&line, book) in &driven.blocks {
         let mut block = BlockPlan { line, duration_s: 0.0, limited_by_s: Shares::new(), lost_s: 0.0 };
-        for (limit, seconds) in &book.spent_s {
-            block.duration_s += seconds;
-            *block.limited_by_s.entry(limit.words(machine)).or_default() += seconds;
-            *plan.limited_by_s.entry(limit.words(machine)).or_default() += seconds;
+        for (limit, periods) in &book.spent {
+            block.duration_s += periods;
+            *block.limited_by_s.entry(limit.words(machine)).or_default() += periods;
+            *plan.limited_by_s.entry(limit.words(machine)).or_default() += periods;
         }
-        for (limit, seconds) in &book.lost_s {
-            block.lost_s += seconds;
-            *plan.lost_s.entry(limit.words(machine)).or_default() += seconds;
+        for (limit, periods) in &book.lost {
+            block.lost_s += periods;
+            *plan.lost_s.entry(limit.words(machine)).or_default() += periods;
+        }
+        let sums = [&mut block.duration_s, &mut block.lost_s];
+        for sum in sums.into_iter().chain(block.limited_by_s.values_mut()) {
+            *sum = seconds(machine, *sum);
         }
         if block.lost_s > longest_loss.0 {
             longest_loss = (block.lost_s, line);
         }
         plan.blocks.push(block);
+    }
+    for sum in plan.limited_by_s.values_mut().chain(plan.lost_s.values_mut()) {
+        *sum = seconds(machine, *sum);
     }
     plan.verdict = verdict(program, machine, options, tries, &driven)?;
     plan.loss = loss(machine, &driven, longest_loss);
@@ -228,11 +239,11 @@ fn drive(program: &Program, machine: &Machine, options: &Options) -> Result<Driv
                 false => limited(machine, &setpoint, &before, period_s).0,
             };
             let book = blocks.entry(setpoint.span.line).or_default();
-            *book.spent_s.entry(limit).or_default() += period_s;
+            *book.spent.entry(limit).or_default() += 1.0;
             // 0 on rapids
             let lost = 1.0 - setpoint.feed_use / options.feed_override;
             if setpoint.feed_use > 0.0 && lost > 0.0 && !in_step {
-                *book.lost_s.entry(limit).or_default() += lost * period_s;
+                *book.lost.entry(limit).or_default() += lost;
             }
         }
         before = [before[1], setpoint.joints];
@@ -255,7 +266,7 @@ fn drive(program: &Program, machine: &Machine, options: &Options) -> Result<Driv
         .collect();
     Ok(Driven {
         blocks,
-        duration_s: (last - first.unwrap_or(last)) as f64 * period_s,
+        duration_s: seconds(machine, (last - first.unwrap_or(last)) as f64),
         starved_stops: feeder.starved_stops(),
         joints,
         min_singularity_distance: if nearest.is_finite() { nearest } else { 0.0 },
@@ -265,9 +276,9 @@ fn drive(program: &Program, machine: &Machine, options: &Options) -> Result<Driv
 
 /// The limit with the most time; of equals the first.
 fn most(causes: &BTreeMap<Limited, f64>) -> Option<(Limited, f64)> {
-    causes.iter().fold(None, |most: Option<(Limited, f64)>, (&limit, &seconds)| match most {
-        Some((_, known)) if known >= seconds => most,
-        _ => Some((limit, seconds)),
+    causes.iter().fold(None, |most: Option<(Limited, f64)>, (&limit, &periods)| match most {
+        Some((_, known)) if known >= periods => most,
+        _ => Some((limit, periods)),
     })
 }
 
@@ -279,12 +290,12 @@ fn verdict(
     tries: bool,
     driven: &Driven,
 ) -> Result<String, Diagnostic> {
-    let causes = driven.causes(|book| &book.spent_s);
+    let causes = driven.causes(|book| &book.spent);
     let total: f64 = causes.values().sum();
-    let Some((limit, seconds)) = most(&causes).filter(|_| total > 0.0) else {
+    let Some((limit, periods)) = most(&causes).filter(|_| total > 0.0) else {
         return Ok("nothing moves".to_owned());
     };
-    let share = 100.0 * seconds / total;
+    let share = 100.0 * periods / total;
     let text = match limit {
         Limited::Dwell => format!("dwells take {share:.0} % of this program's time"),
         _ => format!("{} limits {share:.0} % of this program's time", limit.subject(machine)),
@@ -314,20 +325,23 @@ fn verdict(
 
 /// Where the program falls short of its feed: three limits and the worst block.
 fn loss(machine: &Machine, driven: &Driven, (block_s, line): (f64, u32)) -> String {
-    let mut causes: Vec<(Limited, f64)> =
-        driven.causes(|book| &book.lost_s).into_iter().filter(|(_, seconds)| *seconds >= 0.0005).collect();
+    let causes = driven.causes(|book| &book.lost).into_iter();
+    let mut causes: Vec<(Limited, f64)> = causes
+        .map(|(limit, periods)| (limit, seconds(machine, periods)))
+        .filter(|(_, lost_s)| *lost_s >= 0.0005)
+        .collect();
     causes.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let lost_s: f64 = causes.iter().map(|(_, seconds)| seconds).sum();
+    let lost_s: f64 = causes.iter().map(|(_, lost_s)| lost_s).sum();
     if causes.is_empty() {
         return "no time is lost against the programmed feed".to_owned();
     }
     let named: Vec<String> = causes
         .iter()
         .take(3)
-        .map(|(limit, seconds)| match limit {
+        .map(|(limit, lost_s)| match limit {
             // nearly the feed: what is left to it is no limit's
-            Limited::Feed => format!("{seconds:.3} s just below the feed"),
-            _ => format!("{seconds:.3} s to {}", limit.subject(machine)),
+            Limited::Feed => format!("{lost_s:.3} s just below the feed"),
+            _ => format!("{lost_s:.3} s to {}", limit.subject(machine)),
         })
         .collect();
     format!(
