@@ -1,7 +1,7 @@
 //! Paths, limits and feeds that no program should have: an error with its place, or a correct run. Never NaN, never a
 //! stop that is not the program's.
 
-use crate::catalogue::{Case, blend, identity, moma, on_moma, polyline, xyz};
+use crate::catalogue::{Case, blend, identity, moma, on_delta, on_moma, polyline, xyz};
 use crate::harness::{Disturbance, Rig, Sampling, TestPlanner, drive, limits, start, to_move, with_stack};
 use pkm_canon::Span;
 use pkm_kins::{Axis, InverseError, JointRange, Kinematics, OxForm, OxGlide, Pose};
@@ -320,6 +320,30 @@ fn a_joint_that_turns_back_outside_its_travel_just_after_the_start_of_a_line_is_
         let PlanErrorKind::JointTravel { joint: 0, value, .. } = error.kind else { panic!("{error:?}") };
         assert!((value - lowest).abs() < 1e-5, "{error:?}: it turns at {lowest}");
         assert_eq!(planner.work(), before, "found before anything was cut into nodes");
+    });
+}
+
+/// At full speed they turn by a radian a period: between the nodes, too, the limits hold.
+#[test]
+fn circles_of_some_micrometres_keep_the_limits() {
+    with_stack(|| {
+        let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut random = |low: f64, high: f64| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            low + (high - low) * (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        for case in 0..60 {
+            let at = xyz(random(-8.0, 8.0), random(-8.0, 8.0), 20.0);
+            let (radius, angle) = (libm::exp10(random(-3.0, -1.5)), random(-3.0, 3.0));
+            let centre = [at[0] + radius * libm::cos(angle), at[1] + radius * libm::sin(angle), at[2]];
+            let arc = Arc::new(at, at, centre, [0.0, 0.0, 1.0], [1, -2, 5][case % 3]).unwrap();
+            let circle = on_delta(vec![(Geometry::Arc(arc), PathMode::ExactStop)]);
+            for sampling in [Sampling::SERVO, Sampling::TENTH] {
+                let trace = drive(&circle, sampling, Disturbance::None, false);
+                let most = trace.velocity.max(trace.acceleration);
+                assert!(most <= 1.0, "case {case}, radius {radius} at {at:?}: {most}");
+            }
+        }
     });
 }
 

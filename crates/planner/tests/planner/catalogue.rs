@@ -105,7 +105,7 @@ pub(crate) fn on_moma(moves: Vec<(Geometry, PathMode)>) -> Case {
     }
 }
 
-fn on_delta(moves: Vec<(Geometry, PathMode)>) -> Case {
+pub(crate) fn on_delta(moves: Vec<(Geometry, PathMode)>) -> Case {
     let parameters = LinearDeltaParameters { joint_radius_mm: 105.0, joint_length_mm: 217.0 };
     Case {
         mechanism: Mechanism::LinearDelta(LinearDelta::new(&parameters).unwrap()),
