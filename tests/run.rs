@@ -351,6 +351,58 @@ fn a_full_disk_leaves_old_files_alone() {
     assert!(stderr.contains("cannot write"), "{stderr}");
 }
 
+/// Which of the two kinds of singularity, and which way a joint would have to go.
+#[test]
+fn refusals_say_what_is_wrong_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.ngc");
+    let told = |text: &str, machine: &str| {
+        write(&path, text);
+        let run = pkm(&["check", path.to_str().unwrap(), "--machine", machine]);
+        (run.status, run.stderr)
+    };
+    let (status, message) = told("G21 F600\nG1 X137 Y137\nG1 X137.88 Y137.88\nM2\n", "moma-d");
+    assert_eq!(status, 1, "{message}");
+    assert!(message.contains("(type 2, between the links): measure 8.44e-5, guard 0.001"), "{message}");
+    assert!(
+        message.contains("moves the tool far") && message.contains("warning[near-singular]"),
+        "{message}"
+    );
+    let (status, message) = told("G21 F600\nG1 X78.7 Y-194\nM2\n", "moma-a");
+    assert_eq!(status, 0, "{message}");
+    assert!(message.contains("(type 1, at joint p1)") && message.contains("go fast"), "{message}");
+    let (status, message) = told("G21 F600\nG1 X0 Y-100\nM2\n", "moma-a");
+    assert_eq!(status, 1, "{message}");
+    assert!(message.contains("p1 comes 71.2334 mm higher"), "{message}");
+    let (_, message) = told("G21 F600\nG1 X0 Y-400\nM2\n", "moma-a");
+    assert!(message.contains("mm lower, or choose"), "{message}");
+}
+
+#[test]
+fn interrupted_canon_leaves_no_file_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("endless.ngc");
+    write(&path, "o1 while [1]\nG0 X1\nG0 X0\no1 endwhile\nM2\n");
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_pkm"))
+        .args(["canon", path.to_str().unwrap(), "--max-blocks", "0", "-o"])
+        .arg(out.join("part.canon"))
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    while !std::fs::read_dir(&out).unwrap().any(|file| file.unwrap().metadata().unwrap().len() > 10_000) {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it was interrupted");
+        std::thread::yield_now();
+    }
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("interrupted"));
+    assert!(listing(&out).is_empty(), "{:?}", listing(&out));
+}
+
 #[test]
 fn an_interrupted_run_says_how_far_it_came() {
     let folder = tempfile::tempdir().unwrap();

@@ -214,12 +214,15 @@ fn plot_draws_a_trace_and_a_program_alike() {
     let run = pkm(&["run", &program, "--machine", "moma-a", "--out", ran.to_str().unwrap()]);
     assert_eq!(run.status, 0, "{}", run.stderr);
     let trace = ran.join("trace.csv");
+    let mut told = Vec::new();
     for input in [trace.to_str().unwrap(), &program] {
         let run = pkm(&["plot", input, "--machine", "moma-a", "--out", drawn.to_str().unwrap()]);
         assert_eq!(run.status, 0, "{}", run.stderr);
+        told.push(run.stdout);
         pictures(&drawn, "path");
         assert!(std::fs::read_to_string(drawn.join("joints.svg")).unwrap().contains("% of limit"));
     }
+    assert_eq!(told[0], told[1], "the same rows");
     // Without a machine: units of the trace.
     let run = pkm(&["plot", trace.to_str().unwrap(), "--out", drawn.to_str().unwrap()]);
     assert_eq!(run.status, 0, "{}", run.stderr);

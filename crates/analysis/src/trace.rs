@@ -9,52 +9,45 @@ use std::io::Read;
 const MOST_PIECES: usize = 512;
 const MOST_PATH_PIECES: usize = 2048;
 
-/// Smallest and largest value of a column over pieces of equally many rows.
+/// Smallest and largest value of a column over pieces of equally many rows, each with its time.
 #[derive(Debug, Clone, Default)]
 pub struct Envelope {
-    /// Time of the first row, smallest, largest.
-    pieces: Vec<[f64; 3]>,
+    /// [time, value] of the smallest and of the largest.
+    pieces: Vec<[Vec2; 2]>,
     stride: u64,
     rows: u64,
+}
+
+/// The extremes of both; of equal ones the earlier.
+fn joined(first: &[Vec2; 2], second: &[Vec2; 2]) -> [Vec2; 2] {
+    let low = if second[0][1] < first[0][1] { second[0] } else { first[0] };
+    let high = if second[1][1] > first[1][1] { second[1] } else { first[1] };
+    [low, high]
 }
 
 impl Envelope {
     fn push(&mut self, time_s: f64, value: f64) {
         self.stride = self.stride.max(1);
-        if self.rows.is_multiple_of(self.stride) {
-            if self.pieces.len() == MOST_PIECES {
-                let joined = self.pieces.chunks(2).map(|pair| {
-                    let last = pair[pair.len() - 1];
-                    [pair[0][0], pair[0][1].min(last[1]), pair[0][2].max(last[2])]
-                });
-                self.pieces = joined.collect();
-                self.stride *= 2;
-            }
-            if self.rows.is_multiple_of(self.stride) {
-                self.pieces.push([time_s, value, value]);
-                self.rows += 1;
-                return;
-            }
+        let row = [[time_s, value]; 2];
+        if self.rows.is_multiple_of(self.stride) && self.pieces.len() == MOST_PIECES {
+            let pairs = self.pieces.chunks(2);
+            self.pieces = pairs.map(|pair| joined(&pair[0], &pair[pair.len() - 1])).collect();
+            self.stride *= 2;
         }
-        if let Some([_, low, high]) = self.pieces.last_mut() {
-            (*low, *high) = (low.min(value), high.max(value));
+        match self.pieces.last_mut() {
+            Some(last) if !self.rows.is_multiple_of(self.stride) => *last = joined(last, &row),
+            _ => self.pieces.push(row),
         }
         self.rows += 1;
     }
 
-    /// A line through both ends of every piece; all extremes are on it, at most a piece off in time.
+    /// A line through both extremes of every piece, each at its time.
     pub fn line(&self) -> Vec<Vec2> {
         let mut line: Vec<Vec2> = Vec::new();
-        for (index, &[time, low, high]) in self.pieces.iter().enumerate() {
-            let next = self.pieces.get(index + 1).map_or(time, |piece| piece[0]);
-            // Enter a piece at the end that is nearer.
-            let rising = line.last().is_none_or(|last| (last[1] - low).abs() <= (last[1] - high).abs());
-            let ends = if rising { [low, high] } else { [high, low] };
-            line.push([time, ends[0]]);
-            if low != high {
-                line.push([0.5 * (time + next), ends[1]]);
-            }
+        for &[low, high] in &self.pieces {
+            line.extend(if low[0] <= high[0] { [low, high] } else { [high, low] });
         }
+        line.dedup();
         line
     }
 
@@ -62,7 +55,8 @@ impl Envelope {
     pub fn range(&self) -> Option<[f64; 2]> {
         let mut pieces = self.pieces.iter();
         let first = pieces.next()?;
-        Some(pieces.fold([first[1], first[2]], |[low, high], piece| [low.min(piece[1]), high.max(piece[2])]))
+        let all = pieces.fold(*first, |all, piece| joined(&all, piece));
+        Some(all.map(|[_, value]| value))
     }
 }
 
@@ -331,6 +325,22 @@ mod tests {
         assert!(path.len() <= 5 * MOST_PATH_PIECES && path.contains(&[777.0, 5e3]));
         let stored: usize = trace.paths[0].1.pieces.iter().map(Vec::len).sum();
         assert!(stored <= 64 * MOST_PATH_PIECES, "{stored}");
+    }
+
+    /// However many rows are joined, a steady motion is a straight line and not a staircase.
+    #[test]
+    fn a_straight_line_stays_straight() {
+        let mut trace = Trace::new(vec![('X', "mm".into())], vec![("p1".into(), "mm".into())]);
+        for k in 0..10_000_u32 {
+            let t = f64::from(k) * 1e-3;
+            trace.push(t, &[t], &[5.0 - 2.0 * t]);
+        }
+        let line = trace.joints[0].position.line();
+        assert!(line.len() > MOST_PIECES && line[0] == [0.0, 5.0]);
+        assert_eq!(line.last(), Some(&[9.999, 5.0 - 2.0 * 9.999]));
+        for [t, q] in line {
+            assert!((q - (5.0 - 2.0 * t)).abs() < 1e-12, "{t}: {q}");
+        }
     }
 
     #[test]

@@ -242,13 +242,13 @@ impl fmt::Display for Fault {
                 "{pin} jumps by {steps} steps at tick {tick}; the pulse timing allows {max} in a servo period"
             ),
             Self::OutOfTravel { tick, pin, value, limit } => {
-                write!(f, "{pin} is {value} at tick {tick}, beyond the end of travel at {limit}")
+                write!(f, "{pin} is {value:.6} at tick {tick}, beyond the end of travel at {limit}")
             }
             Self::FollowingError { tick, pin, value, limit } => {
-                write!(f, "{pin} is {value} at tick {tick}, the limit is {limit}")
+                write!(f, "{pin} is {value:.6} at tick {tick}, the limit is {limit}")
             }
             Self::Acceleration { tick, pin, value, limit } => {
-                write!(f, "{pin} asks for an acceleration of {value} at tick {tick}, the limit is {limit}")
+                write!(f, "{pin} asks for an acceleration of {value:.6} at tick {tick}, the limit is {limit}")
             }
             Self::AmplifierFault { tick, pin } => write!(f, "{pin} is on at tick {tick}: a drive has failed"),
             Self::MissedPeriods { tick, periods } => {

@@ -348,7 +348,7 @@ impl fmt::Display for InverseError {
             ),
             Self::Singular { measure } => write!(
                 f,
-                "singular pose (measure {measure:.2e}): joint speeds are not defined here; keep away from it",
+                "singular pose (measure {measure:.2e}): joints and tool do not determine each other's speed here",
             ),
             Self::FormSwitch { c_mm, guard_mm } => write!(
                 f,

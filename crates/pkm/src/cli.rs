@@ -11,7 +11,7 @@ use std::path::PathBuf;
 #[command(name = "pkm", version, propagate_version = true, arg_required_else_help = true)]
 pub(crate) struct Cli {
     /// When to colour messages; NO_COLOR and TERM=dumb are honoured
-    #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN")]
+    #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN", display_order = 900)]
     pub color: Color,
     #[command(subcommand)]
     pub command: Command,
@@ -185,7 +185,7 @@ pub(crate) struct Run {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub trace_substeps: u32,
     /// Feed override, percent of the programmed feed
-    #[arg(long, value_name = "PERCENT", default_value_t = 100.0, value_parser = percent)]
+    #[arg(long, value_name = "PERCENT", default_value_t = 100.0, value_parser = percent, allow_negative_numbers = true)]
     pub feed_override: f64,
     /// The machine begins without knowing where it is: it homes first, to the machine file's home pose
     #[arg(long)]

@@ -1,5 +1,6 @@
-//! Ctrl-C: the first asks for a clean end, the second ends at once.
+//! Ctrl-C: the first asks for a clean end, the second ends at once. A command that has written nothing yet ends at once, too.
 
+use std::io::{Write, stderr};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -17,4 +18,12 @@ pub(crate) fn flag() -> Arc<AtomicBool> {
         }
     });
     flag
+}
+
+/// For a command that leaves nothing half done: the first Ctrl-C says so and ends it.
+pub(crate) fn at_once(what: &'static str) {
+    let _ = ctrlc::set_handler(move || {
+        let _ = writeln!(stderr(), "interrupted: the {what} is not finished, nothing was written");
+        std::process::exit(i32::from(STATUS));
+    });
 }

@@ -172,10 +172,15 @@ pub(crate) fn json(value: &impl Serialize) -> Result<String, Failure> {
 
 /// What the system said about a path.
 pub(crate) fn failure(path: &Path, error: &io::Error) -> Failure {
-    Failure::could_not(
-        "output",
-        &path.display().to_string(),
-        format!("cannot write {}: {error}", path.display()),
-        "free space or choose another folder; files that were there are as they were",
-    )
+    let help = match error.kind() {
+        io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => {
+            "a file of that name stands in the way of the folder: choose another folder"
+        }
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            "you may not write there: choose another folder; files that were there are as they were"
+        }
+        _ => "free space or choose another folder; files that were there are as they were",
+    };
+    let message = format!("cannot write {}: {error}", path.display());
+    Failure::could_not("output", &path.display().to_string(), message, help)
 }

@@ -15,7 +15,7 @@ use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_canon::{FileId, Span};
 use pkm_gcode::{Settings, Status};
 use pkm_kins::machine::Mechanism;
-use pkm_kins::{JointRange, Kinematics, Pose};
+use pkm_kins::{JointRange, Kinematics, Pose, Singularity};
 use pkm_machine::Machine;
 use pkm_planner::path::{FeedGroup, Geometry};
 use pkm_planner::{Event, Feed, Frame, Move, PlanError, PlanErrorKind, SynchronisedMove};
@@ -371,7 +371,7 @@ fn check_move(
     }
     let bend = if matches!(step.geometry, Geometry::Line(_)) { 1.0 } else { 4.0 };
     let count = step.geometry.places(SPACING / bend, MOST_SAMPLES).max(2);
-    let mut nearest: Option<(f64, usize, Pose)> = None;
+    let mut nearest: Option<(f64, Singularity, Pose)> = None;
     let mut worst: Option<(PlanErrorKind, Pose)> = None;
     limits.walk(mechanism, &step.geometry, (count, true), None, |pose, outcome| {
         match outcome {
@@ -383,7 +383,7 @@ fn check_move(
             Ok(measure) => {
                 let value = measure.inverse.min(measure.forward);
                 if value < machine.singularity.warn && nearest.is_none_or(|(best, ..)| value < best) {
-                    nearest = Some((value, measure.inverse_joint, *pose));
+                    nearest = Some((value, measure, *pose));
                 }
             }
         }
@@ -393,8 +393,8 @@ fn check_move(
         findings.push(messages::plan(program, machine, &PlanError { kind, span, pose }));
         return Some(pose);
     }
-    if let Some((value, joint, pose)) = nearest {
-        findings.push(messages::too_near_singularity(program, machine, span, &pose, joint, value));
+    if let Some((_, measure, pose)) = nearest {
+        findings.push(messages::too_near_singularity(program, machine, span, &pose, &measure));
     }
     None
 }

@@ -4,7 +4,7 @@ use crate::program::Program;
 use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_hal_sim::{Fault, HalError, HomingError, PinFault};
-use pkm_kins::{InverseError, JointLimit, Kinematics, Pose, Side, maths};
+use pkm_kins::{InverseError, JointLimit, Kinematics, Pose, Side, Singularity, maths};
 use pkm_machine::{Machine, Refusal, SwitchTarget};
 use pkm_planner::{PlanError, PlanErrorKind, SpindleOrder, Stage, SynchronisedMove};
 use std::io;
@@ -73,7 +73,8 @@ pub(crate) fn plan(program: &Program, machine: &Machine, error: &PlanError) -> D
             );
             let beyond = face(if low { range.min - value } else { value - range.max });
             let help = format!(
-                "move the part so that {joint_name} needs {beyond:.4} {unit} less, or choose another configuration"
+                "move the part so that {joint_name} comes {beyond:.4} {unit} {}, or choose another configuration",
+                if low { "higher" } else { "lower" }
             );
             at(program, error.span, &code, Severity::Error, message, &help)
         }
@@ -92,6 +93,17 @@ pub(crate) fn plan(program: &Program, machine: &Machine, error: &PlanError) -> D
             at(program, error.span, &code, Severity::Error, message, "shift the work offset or the part")
         }
         PlanErrorKind::Unreachable(inner) => {
+            let code = inner.code().to_string();
+            if let InverseError::Singular { measure } = inner
+                && let Ok(near) = machine.mechanism.singularity(&error.pose)
+            {
+                let (which, help) = kind_of_singularity(machine, &near);
+                let message = format!(
+                    "at {place} the mechanism is too near to a singularity ({which}): measure {measure:.2e}, guard {}",
+                    machine.singularity.guard
+                );
+                return at(program, error.span, &code, Severity::Error, message, help);
+            }
             let message = format!("{place} cannot be reached: {inner}");
             let help = match inner {
                 InverseError::AxisLocked { .. } if !machine.switches.is_empty() => {
@@ -104,7 +116,7 @@ pub(crate) fn plan(program: &Program, machine: &Machine, error: &PlanError) -> D
                     "move the part into the workspace (`pkm workspace` draws it), or choose another configuration"
                 }
             };
-            at(program, error.span, &inner.code().to_string(), Severity::Error, message, help)
+            at(program, error.span, &code, Severity::Error, message, help)
         }
         PlanErrorKind::NoFeed => feed_unset(program, error.span),
         PlanErrorKind::NoPitch => pitch_zero(program, error.span),
@@ -210,21 +222,36 @@ pub(crate) fn interrupted(program: &Program, line: u32, ticks: u64) -> Diagnosti
     at(program, span, "interrupted", Severity::Error, message, "run it again to finish it")
 }
 
+/// Which of the two kinds of singularity is the nearer one, and what it does to a machine.
+fn kind_of_singularity(machine: &Machine, measure: &Singularity) -> (String, &'static str) {
+    if measure.forward < measure.inverse {
+        (
+            "type 2, between the links".to_owned(),
+            "a small error of the joints moves the tool far here: move the part away, or choose another configuration",
+        )
+    } else {
+        let name = machine.joints.get(measure.inverse_joint).map_or("?", |j| j.name.as_str());
+        (
+            format!("type 1, at joint {name}"),
+            "a joint must go fast here to move the tool slowly: move the part away, or choose another configuration",
+        )
+    }
+}
+
 pub(crate) fn too_near_singularity(
     program: &Program,
     machine: &Machine,
     span: Span,
     pose: &Pose,
-    joint: usize,
-    measure: f64,
+    measure: &Singularity,
 ) -> Diagnostic {
-    let name = machine.joints.get(joint).map_or("?", |j| j.name.as_str());
+    let (which, help) = kind_of_singularity(machine, measure);
+    let value = measure.forward.min(measure.inverse);
     let message = format!(
-        "at {} the mechanism comes near a singularity: measure {measure:.4} at joint {name} (warned below {})",
+        "at {} the mechanism comes near a singularity ({which}): measure {value:.4} (warned below {})",
         place(machine, pose),
         machine.singularity.warn
     );
-    let help = "expect slow motion here; move the part away from the edge of the workspace";
     at(program, span, "near-singular", Severity::Warning, message, help)
 }
 

@@ -52,8 +52,9 @@ pub fn path(title: &str, trace: &Trace, outlines: &[Outline]) -> String {
         let style = format!("stroke=\"{}\" stroke-width=\"1.4\" stroke-linejoin=\"round\"", ink::SERIES[0]);
         figure.lines(&panel, std::slice::from_ref(line), &style);
         if let (Some(first), Some(last)) = (line.first(), line.last()) {
-            figure.disc(&panel, *first, 4.5, "fill=\"#009e73\" stroke=\"#ffffff\" stroke-width=\"1\"");
-            figure.square(&panel, *last, 4.0, "fill=\"#d55e00\" stroke=\"#ffffff\" stroke-width=\"1\"");
+            // The disc on the square, so that both are seen where a path ends at its start.
+            figure.square(&panel, *last, 5.5, "fill=\"#d55e00\" stroke=\"#ffffff\" stroke-width=\"1\"");
+            figure.disc(&panel, *first, 3.5, "fill=\"#009e73\" stroke=\"#ffffff\" stroke-width=\"1\"");
         }
         figure.frame(&panel);
         left += SIDE + 96.0;

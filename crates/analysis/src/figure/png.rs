@@ -1,7 +1,7 @@
 //! SVG → PNG. Text is turned into outlines of a font that is in the program: the same picture on every machine, whatever fonts it
 //! has, and without the renderer's own text engine, which would be most of its size.
 
-use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 use std::fmt::Write as _;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
@@ -18,6 +18,8 @@ pub fn png(svg: &str, scale: f32) -> Result<Vec<u8>, String> {
         Tree::from_str(&outlined(svg, &face), &Options::default()).map_err(|error| error.to_string())?;
     let size = tree.size().to_int_size().scale_by(scale).ok_or("the picture has no size")?;
     let mut pixels = Pixmap::new(size.width(), size.height()).ok_or("the picture is too large")?;
+    // The last row and column may be covered in part only.
+    pixels.fill(Color::WHITE);
     resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixels.as_mut());
     pixels.encode_png().map_err(|error| error.to_string())
 }
@@ -120,9 +122,18 @@ mod tests {
         assert!(!outlined(svg, &face).contains("<text"));
         let pixels = Pixmap::decode_png(&png(svg, 1.0).unwrap()).unwrap();
         let inked = |from: u32, to: u32| {
-            (from..to).any(|x| (0..20).any(|y| pixels.pixel(x, y).is_some_and(|p| p.alpha() > 128)))
+            (from..to).any(|x| (0..20).any(|y| pixels.pixel(x, y).is_some_and(|p| p.red() < 128)))
         };
         assert!(inked(15, 50) && !inked(51, 60) && !inked(0, 10));
         assert!(png(svg, 0.0).is_err());
+    }
+
+    /// A width that is no whole number of pixels leaves no dark or transparent edge.
+    #[test]
+    fn the_ground_is_white_to_the_last_pixel() {
+        let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"30.56\" height=\"20.3\">\n\
+                   <rect width=\"30.56\" height=\"20.3\" fill=\"#ffffff\"/>\n</svg>";
+        let pixels = Pixmap::decode_png(&png(svg, 1.5).unwrap()).unwrap();
+        assert!(pixels.pixels().iter().all(|p| p.alpha() == 255 && p.red() == 255));
     }
 }

@@ -4,7 +4,8 @@ use crate::cli::{Canon, CanonFormat, Dialect, OnError};
 use crate::commands::ini::Ini;
 use crate::commands::parameters::Kept;
 use crate::commands::{program, tool_table};
-use crate::outcome::{Failure, Outcome};
+use crate::interrupt;
+use crate::outcome::{self, Failure, Outcome};
 use crate::output;
 use crate::render::canon_json::JsonWriter;
 use crate::render::diagnostics::{Json, Messages};
@@ -20,6 +21,7 @@ use serde_json::json;
 use std::cell::{Cell, RefCell};
 use std::io::{self, BufWriter, Write, stdout};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Failure> {
     let program = program::open(&arguments.program)?;
@@ -81,14 +83,16 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
         }
         Some(path) => {
             let told = |error: io::Error| output::failure(path, &error);
-            let file = output::Target::open(path).map_err(told)?;
-            let file = print(arguments, &mut interpreter, source.as_mut(), BufWriter::new(file), report)
-                .map_err(told)?;
-            file.into_inner()
-                .map_err(io::IntoInnerError::into_error)
-                .map_err(told)?
-                .commit()
-                .map_err(told)?;
+            let interrupted = interrupt::flag();
+            let file = Interruptible { file: output::Target::open(path).map_err(told)?, by: &interrupted };
+            let printed = print(arguments, &mut interpreter, source.as_mut(), BufWriter::new(file), report);
+            if interrupted.load(Ordering::Relaxed) {
+                let message = format!("interrupted: {} is as it was", path.display());
+                messages.print(&[outcome::warning("interrupted", &name, message, "run it again")]);
+                return Ok(Outcome::Interrupted);
+            }
+            let file = printed.and_then(|file| file.into_inner().map_err(io::IntoInnerError::into_error));
+            file.and_then(|whole| whole.file.commit()).map_err(told)?;
         }
     }
     if let Some(kept) = kept {
@@ -201,5 +205,25 @@ impl LineSource for Stoppable<'_> {
 
     fn file_name(&self, file: FileId) -> Option<String> {
         self.source.file_name(file)
+    }
+}
+
+/// A file that takes nothing more after Ctrl-C; what was written so far is thrown away.
+struct Interruptible<'a> {
+    file: output::Target,
+    by: &'a AtomicBool,
+}
+
+impl Write for Interruptible<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.by.load(Ordering::Relaxed) {
+            Err(io::ErrorKind::Other.into())
+        } else {
+            self.file.write(bytes)
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::cli::{Check, Format};
 use crate::commands::program::{Job, Text, answered};
+use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::render::diagnostics::{Json, Messages};
@@ -26,6 +27,7 @@ pub(crate) fn run(arguments: &Check, messages: &Messages) -> Result<Outcome, Fai
 }
 
 fn check(arguments: &Check, messages: &Messages) -> Result<Outcome, Failure> {
+    interrupt::at_once("check");
     let (program, machine, checked) = if arguments.program.machine.machine.is_some() {
         let job = Job::new(&arguments.program, messages)?;
         let checked = pkm_run::check(&job.program, &job.machine, &job.options)?;

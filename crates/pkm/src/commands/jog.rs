@@ -75,6 +75,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         ]);
         pose = end.pose;
     }
-    writeln!(stdout().lock(), "{table}")?;
+    let mut out = stdout().lock();
+    for line in table.lines() {
+        writeln!(out, "{}", line.trim_end())?;
+    }
     Ok(Outcome::Clean)
 }

@@ -2,6 +2,7 @@
 
 use crate::cli::{Format, Plan};
 use crate::commands::program::{Job, answered};
+use crate::interrupt;
 use crate::outcome::{Failure, Outcome};
 use crate::output;
 use crate::render::diagnostics::{Json, Messages};
@@ -21,6 +22,7 @@ pub(crate) fn run(arguments: &Plan, messages: &Messages) -> Result<Outcome, Fail
 }
 
 fn plan(arguments: &Plan, messages: &Messages) -> Result<Outcome, Failure> {
+    interrupt::at_once("plan");
     let job = Job::new(&arguments.program, messages)?;
     let plan = pkm_run::plan(&job.program, &job.machine, &job.options)?;
     match arguments.program.format {

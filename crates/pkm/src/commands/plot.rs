@@ -49,7 +49,14 @@ impl Observer for Recorder {
 }
 
 impl Recorder {
-    fn new(machine: &Machine) -> Self {
+    /// Begins with the machine as it stands, like `trace.csv`.
+    fn new(machine: &Machine, simulation: &Simulation) -> Self {
+        let mut recorder = Self::empty(machine);
+        recorder.tick(&simulation.report());
+        recorder
+    }
+
+    fn empty(machine: &Machine) -> Self {
         let axes: Vec<Axis> = machine.mechanism.axes().iter().collect();
         let unit = |rotary: bool| if rotary { "deg" } else { "mm" }.to_owned();
         let letters = axes.iter().map(|axis| (axis.letter(), unit(axis.is_rotary()))).collect();
@@ -135,7 +142,7 @@ fn drive(
     interrupted: &AtomicBool,
 ) -> Result<Option<Trace>, Failure> {
     let program = program::open(&arguments.input)?;
-    let outputs = |_: &Simulation| Recorder::new(machine);
+    let outputs = |simulation: &Simulation| Recorder::new(machine, simulation);
     let go = |_: &pkm_run::Progress| {
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };

@@ -143,7 +143,7 @@ fn text(out: &mut impl Write, summary: &Summary) -> io::Result<()> {
             "    usable    {:14.4} mm² ± {:.4}",
             view.usable_area_mm2, view.usable_area_error_bound_mm2
         )?;
-        let bound = |value: Option<f64>| value.map_or("no bound".to_owned(), |value| format!("{value:.4}"));
+        let bound = |value: Option<f64>| value.map_or("no bound".to_owned(), |value| fixed(value, 4));
         writeln!(out, "    det K from {} to {}", bound(view.det_k[0]), bound(view.det_k[1]))?;
         let singular = |within: bool| if within { "within" } else { "not within" };
         writeln!(
@@ -171,7 +171,28 @@ fn text(out: &mut impl Write, summary: &Summary) -> io::Result<()> {
         )?;
     }
     for (axis, [low, high]) in &summary.bounding_box_mm {
-        writeln!(out, "  {axis} from {low:.3} to {high:.3} mm")?;
+        writeln!(out, "  {axis} from {} to {} mm", fixed(*low, 3), fixed(*high, 3))?;
     }
     Ok(())
+}
+
+/// With so many decimals; what rounds to 0 has no sign.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.bytes().all(|byte| matches!(byte, b'0' | b'.')) => digits.to_owned(),
+        _ => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fixed;
+
+    #[test]
+    fn zero_has_no_sign() {
+        assert_eq!(fixed(-7.7e-16, 4), "0.0000");
+        assert_eq!(fixed(-0.0001, 4), "-0.0001");
+        assert_eq!(fixed(-20.0, 3), "-20.000");
+    }
 }

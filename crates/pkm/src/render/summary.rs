@@ -25,7 +25,12 @@ pub(crate) fn json(summary: &Summary) -> Result<String, Failure> {
 /// Some lines and a table.
 pub(crate) fn text(summary: &Summary) -> String {
     let mut text = String::new();
-    let verdict = if summary.completed { "completed" } else { "NOT completed" };
+    let verdict = match (summary.completed, summary.servo_ticks) {
+        (true, 0) => "completed, nothing moved",
+        (true, _) => "completed",
+        (false, 0) => "NOT completed, nothing moved",
+        (false, _) => "NOT completed",
+    };
     let _ = writeln!(text, "{} on {}: {verdict}", summary.program, summary.machine);
     if summary.servo_ticks == 0 {
         return text;
