@@ -233,6 +233,11 @@ impl fmt::Display for PinName {
     }
 }
 
+/// To a millionth, which is what a person reads of it.
+fn short(value: f64) -> f64 {
+    if value.abs() < 1e9 { (value * 1e6).round() / 1e6 } else { value }
+}
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -242,13 +247,17 @@ impl fmt::Display for Fault {
                 "{pin} jumps by {steps} steps at tick {tick}; the pulse timing allows {max} in a servo period"
             ),
             Self::OutOfTravel { tick, pin, value, limit } => {
-                write!(f, "{pin} is {value:.6} at tick {tick}, beyond the end of travel at {limit}")
+                write!(f, "{pin} is {value} at tick {tick}, beyond the end of travel at {limit}")
             }
             Self::FollowingError { tick, pin, value, limit } => {
-                write!(f, "{pin} is {value:.6} at tick {tick}, the limit is {limit}")
+                write!(f, "{pin} is {} at tick {tick}, the limit is {limit}", short(value))
             }
             Self::Acceleration { tick, pin, value, limit } => {
-                write!(f, "{pin} asks for an acceleration of {value:.6} at tick {tick}, the limit is {limit}")
+                write!(
+                    f,
+                    "{pin} asks for an acceleration of {} at tick {tick}, the limit is {limit}",
+                    short(value)
+                )
             }
             Self::AmplifierFault { tick, pin } => write!(f, "{pin} is on at tick {tick}: a drive has failed"),
             Self::MissedPeriods { tick, periods } => {
@@ -262,3 +271,15 @@ impl fmt::Display for Fault {
 }
 
 impl std::error::Error for Fault {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_following_error_is_told_in_digits_one_can_read() {
+        let pin = PinName { owner: "joint", index: PinIndex::Number(1), pin: "f-error" };
+        let fault = Fault::FollowingError { tick: 401, pin, value: 0.026_533_213_925_006_294, limit: 0.0075 };
+        assert_eq!(fault.to_string(), "joint.1.f-error is 0.026533 at tick 401, the limit is 0.0075");
+    }
+}
