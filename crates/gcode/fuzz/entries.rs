@@ -112,7 +112,7 @@ fn settings(choice: u8) -> Settings {
 
 /// Runs a program to its end, whatever it is, and judges every error.
 fn run(files: &mut Files<'_>, settings: Settings, start_line: Option<u32>) {
-    let diagnostics = static_check(files, &settings, None, "program");
+    let diagnostics = static_check(files, &settings, &[], None, "program");
     diagnostics.iter().for_each(|diagnostic| files.assert_placed(diagnostic));
     files.seek(Place::default()).expect("memory can be sought");
     let mut interpreter = Interpreter::new(settings);
@@ -147,7 +147,7 @@ fn run(files: &mut Files<'_>, settings: Settings, start_line: Option<u32>) {
 pub fn lexer(bytes: &[u8]) {
     for dialect in [Dialect::Pkm, Dialect::LinuxCnc29] {
         let settings = Settings { dialect, ..settings(0) };
-        let diagnostics = static_check(&mut Files::new(&[bytes]), &settings, None, "program");
+        let diagnostics = static_check(&mut Files::new(&[bytes]), &settings, &[], None, "program");
         let files = Files::new(&[bytes]);
         diagnostics.iter().for_each(|diagnostic| files.assert_placed(diagnostic));
     }
@@ -166,7 +166,7 @@ pub fn expressions(bytes: &[u8]) {
     }
     assert!(interpreter.parameters().get(32).is_finite());
     // What is wrong however the values turn out is wrong when it runs.
-    let found = static_check(&mut MemorySource::new(&text), &settings(0), None, "program");
+    let found = static_check(&mut MemorySource::new(&text), &settings(0), &[], None, "program");
     let wrong = found.iter().any(|d| d.severity == pkm_canon::diagnostic::Severity::Error && d.line == 2);
     assert!(failed || !wrong || found.iter().any(|d| d.code == "param-undefined"), "{found:?}");
 }

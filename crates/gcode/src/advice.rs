@@ -156,7 +156,9 @@ fn meant(error: &Error, line: &[u8], names: &Names) -> Option<String> {
         ErrorKind::MUnknown { number } | ErrorKind::MUnsupported { number }
             if pkm_canon::MACHINE_CODES.contains(&number) =>
         {
-            Some(format!("only a machine file can give M{number} a meaning: name one that does (--machine)"))
+            Some(format!(
+                "only a machine file can give M{number} a meaning: by [[switch]] or program.remap (--machine)"
+            ))
         }
         // An exponent: the E was read as a word of its own, or left without a number.
         ErrorKind::WordUnused { letter: 'E', .. } if ends_with_digit(&line[..start]) => {

@@ -1,9 +1,11 @@
 //! Remapped codes: `REMAP = M400 modalgroup=10 argspec=Pq ngc=probe` of LinuxCNC's INI file (dialect section 17). A sub of the
 //! program's own language does what the code means; Python is refused by name.
 
+use crate::block::Block;
 use crate::modal::{GCode, GGroup, MGroup};
 use crate::settings::{Dialect, Settings};
-use alloc::{boxed::Box, format, string::String, vec::Vec};
+use alloc::{borrow::ToOwned, boxed::Box, format, string::String, vec::Vec};
+use pkm_canon::Span;
 
 /// The code that a sub is called for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +37,19 @@ pub struct RemapError {
     pub help: &'static str,
 }
 
+impl Remapped {
+    /// Where a block holds the code.
+    pub(crate) fn place_in(self, block: &Block) -> Option<Span> {
+        match self {
+            Self::M(number, group) => (block.m(group) == Some(number)).then(|| block.m_span(group)),
+            Self::G(number) => {
+                (block.g(GGroup::Motion) == Some(number)).then(|| block.g_span(GGroup::Motion))
+            }
+            Self::Word(letter) => block.has(letter).then(|| block.word_span(letter)),
+        }
+    }
+}
+
 fn refuse<T>(message: String, help: &'static str) -> Result<T, RemapError> {
     Err(RemapError { message, help })
 }
@@ -56,7 +71,9 @@ impl Remap {
     pub fn parse(text: &str, settings: &Settings) -> Result<Self, RemapError> {
         let text = text.split('#').next().unwrap_or_default();
         let mut words = text.split_ascii_whitespace();
-        let code = words.next().unwrap_or_default();
+        let Some(code) = words.next() else {
+            return refuse("nothing is remapped".to_owned(), "write CODE modalgroup=10 argspec=Pq ngc=NAME");
+        };
         let (mut group, mut arguments, mut sub) = (None, "", None);
         for word in words {
             let Some((key, value)) = word.split_once('=').filter(|(_, value)| !value.is_empty()) else {
@@ -106,6 +123,24 @@ impl Remap {
     /// The name of the sub, and of its file without `.ngc`.
     pub fn sub(&self) -> &str {
         &self.sub
+    }
+
+    /// True if both remap the same code.
+    pub fn is_of_the_code_of(&self, other: &Self) -> bool {
+        match (self.code, other.code) {
+            (Remapped::M(a, _), Remapped::M(b, _)) => a == b,
+            (a, b) => a == b,
+        }
+    }
+
+    /// The names that its words have in the sub.
+    #[cfg(feature = "std")]
+    pub(crate) fn names(&self) -> impl Iterator<Item = u8> {
+        self.arguments.bytes().filter_map(|c| match c {
+            b'>' => Some(b'f'),
+            b'^' => Some(b's'),
+            _ => c.is_ascii_alphabetic().then(|| c.to_ascii_lowercase()),
+        })
     }
 
     /// True if a word is handed to the sub.
@@ -193,21 +228,24 @@ fn is_known(code: GCode, settings: &Settings) -> bool {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Remaps(Vec<Remap>);
 
-/// None.
-pub(crate) static NO_REMAPS: Remaps = Remaps(Vec::new());
-
 impl Remaps {
+    /// These; of one code the first.
+    #[cfg(feature = "std")]
+    pub(crate) fn of(list: &[Remap]) -> Self {
+        let mut remaps = Self::default();
+        for remap in list {
+            remaps.add(remap.clone());
+        }
+        remaps
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
     /// Adds one; false if its code is there already.
     pub(crate) fn add(&mut self, remap: Remap) -> bool {
-        let same = |a: Remapped, b: Remapped| match (a, b) {
-            (Remapped::M(a, _), Remapped::M(b, _)) => a == b,
-            (a, b) => a == b,
-        };
-        let known = self.0.iter().any(|known| same(known.code, remap.code));
+        let known = self.0.iter().any(|known| known.is_of_the_code_of(&remap));
         if !known {
             self.0.push(remap);
         }
@@ -257,6 +295,7 @@ mod tests {
             ("M400 py=f", "py=f needs Python"),
             ("M400 ngc=a prolog=p", "prolog=p needs Python"),
             ("M400 ngc=a epilog=e", "epilog=e needs Python"),
+            ("", "nothing is remapped"),
             ("M400", "M400 has no ngc="),
             ("M400 ngc", "'ngc' has no value"),
             ("M400 ngc=a foo=1", "'foo=' is not known"),

@@ -100,43 +100,54 @@ pub use file::FileSource;
 #[cfg(feature = "std")]
 mod file {
     use super::{LineSource, MAX_LINE, Place, SourceError};
+    use alloc::boxed::Box;
     use alloc::string::{String, ToString};
     use alloc::{format, vec::Vec};
     use pkm_canon::FileId;
+    use std::fmt::Debug;
     use std::fs::File;
-    use std::io::{self, BufRead, BufReader};
+    use std::io::{self, BufRead, BufReader, Cursor, Seek};
     use std::path::{Path, PathBuf};
 
-    /// A program file and, beside it and along a search path, the subroutine files it calls.
+    /// A program and, along a search path, the subroutine files it calls.
     #[derive(Debug)]
-    pub struct FileSource {
-        files: Vec<Opened>,
+    pub struct FileSource<'a> {
+        files: Vec<Opened<'a>>,
         current: usize,
         search_path: Vec<PathBuf>,
         /// The line last read; never longer than `MAX_LINE + 1`.
         line: Vec<u8>,
     }
 
+    /// A file, or a text in memory.
+    trait Input: BufRead + Seek + Debug {}
+    impl<T: BufRead + Seek + Debug> Input for T {}
+
     #[derive(Debug)]
-    struct Opened {
+    struct Opened<'a> {
         path: PathBuf,
-        reader: BufReader<File>,
+        reader: Box<dyn Input + 'a>,
         place: Place,
     }
 
-    impl FileSource {
+    impl<'a> FileSource<'a> {
         /// Opens the program. Subroutine files are looked for in `search_path`, in order.
         ///
         /// # Errors
         /// What the host says when the file cannot be opened.
         pub fn open(program: &Path, search_path: Vec<PathBuf>) -> io::Result<Self> {
-            let opened = Opened::open(program.to_path_buf(), FileId(0))?;
-            Ok(Self {
-                files: Vec::from([opened]),
-                current: 0,
-                search_path,
-                line: Vec::with_capacity(MAX_LINE + 1),
-            })
+            Ok(Self::new(Opened::open(program.to_path_buf(), FileId(0))?, search_path))
+        }
+
+        /// The same of a program in memory, which messages call `name`.
+        pub fn of_text(name: &str, text: &'a [u8], search_path: Vec<PathBuf>) -> Self {
+            let reader = Box::new(Cursor::new(text));
+            Self::new(Opened { path: name.into(), reader, place: Place::default() }, search_path)
+        }
+
+        fn new(program: Opened<'a>, search_path: Vec<PathBuf>) -> Self {
+            let line = Vec::with_capacity(MAX_LINE + 1);
+            Self { files: Vec::from([program]), current: 0, search_path, line }
         }
 
         /// The path of a file this source has opened.
@@ -145,9 +156,9 @@ mod file {
         }
     }
 
-    impl Opened {
+    impl Opened<'_> {
         fn open(path: PathBuf, file: FileId) -> io::Result<Self> {
-            let reader = BufReader::with_capacity(1 << 16, File::open(&path)?);
+            let reader = Box::new(BufReader::with_capacity(1 << 16, File::open(&path)?));
             Ok(Self { path, reader, place: Place { file, line: 0, offset: 0 } })
         }
 
@@ -160,7 +171,7 @@ mod file {
         }
     }
 
-    impl LineSource for FileSource {
+    impl LineSource for FileSource<'_> {
         fn place(&self) -> Place {
             self.files[self.current].place
         }

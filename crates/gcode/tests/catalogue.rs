@@ -227,7 +227,7 @@ fn settings(dialect: Dialect) -> Settings {
 fn said(text: &[u8], settings: Settings) -> Vec<(&'static str, String)> {
     let mut said = Vec::new();
     let mut source = MemorySource::new(text);
-    for finding in static_check(&mut source, &settings, None, "program") {
+    for finding in static_check(&mut source, &settings, &[], None, "program") {
         let row = ErrorKind::CATALOGUE.iter().find(|row| row.0 == finding.code).expect("a row");
         said.push((row.0, finding.message));
     }

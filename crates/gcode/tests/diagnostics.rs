@@ -55,7 +55,7 @@ fn said(files: &[(&str, &str)]) -> Vec<Diagnostic> {
     let mut source = Files { files: sources, current: 0 };
     let settings =
         Settings { dialect: Dialect::Pkm, max_blocks: 1000, max_idle_blocks: 1000, ..Settings::default() };
-    let mut said = static_check(&mut source, &settings, None, "program");
+    let mut said = static_check(&mut source, &settings, &[], None, "program");
     source.seek(Place::default()).expect("memory can be sought");
     let mut interpreter = Interpreter::new(settings);
     *interpreter.tools_mut() = ToolTable::parse(support::TOOLS.as_bytes(), |_, _| {}).expect("a table");

@@ -337,7 +337,7 @@ fn profile_words_need_no_axes() {
             "G18 G21 F100\no7 sub\nG1 Z-9\no7 endsub\no100 sub\nG0 X2 Z0\nG1 Z-4 {words}\nX6 Z-5\no7 call\n\
              o100 endsub\nG0 X20 Z1\n{use_of_subs}\nM2\n"
         );
-        let said = static_check(&mut MemorySource::new(text.as_bytes()), &settings, None, "program");
+        let said = static_check(&mut MemorySource::new(text.as_bytes()), &settings, &[], None, "program");
         said.into_iter().map(|d| (d.code, d.line, d.column, d.end_column)).collect()
     };
     let wrong = |code: &str, column: u32| (code.to_string(), 7, column, column + 1);

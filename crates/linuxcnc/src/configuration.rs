@@ -8,6 +8,7 @@ use pkm_kins::{JointKind, Kinematics, OxForm, Spindle, maths};
 use pkm_machine::kinematics::Parameters;
 use pkm_machine::{Joint, Machine, MachineFile, Switch, SwitchTarget};
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
 /// A configuration: file names (with `/` for folders) and contents.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,7 +37,7 @@ pub fn configuration(file: &MachineFile, machine: &Machine) -> Configuration {
         ("tool.tbl".into(), "T1 P1 D1 Z0 ;lengths in mm; one line for each tool\n".into()),
         (format!("{name}.var"), "5220\t1\n".into()),
         ("example.ngc".into(), example(machine, &travel)),
-        ("machine.toml".into(), file.source.text().to_owned()),
+        ("machine.toml".into(), machine_file(file, machine)),
         ("README.md".into(), readme(machine, module, &ini_name)),
     ];
     if let Some(module) = module {
@@ -47,6 +48,25 @@ pub fn configuration(file: &MachineFile, machine: &Machine) -> Configuration {
         files.push((format!("remap/m{}.ngc", switch.code), remap(file, switch, &travel)));
     }
     Configuration { ini: ini_name, module, files }
+}
+
+/// Folders of subroutine files. The configuration is elsewhere than the machine file, so they begin at the root.
+fn subroutine_path(machine: &Machine) -> Vec<String> {
+    let absolute = |folder: &PathBuf| std::path::absolute(folder).unwrap_or_else(|_| folder.clone());
+    machine.program.subroutine_path.iter().map(|folder| absolute(folder).display().to_string()).collect()
+}
+
+/// The machine file as written, but for these folders.
+fn machine_file(file: &MachineFile, machine: &Machine) -> String {
+    let mut text = file.source.text().to_owned();
+    let written = file.tables.program.subroutine_path.iter().zip(subroutine_path(machine));
+    // From the end, so that the places before it stay; a folder that --set names stands behind the text.
+    for (folder, absolute) in
+        written.rev().filter(|(folder, _)| folder.span().end <= file.source.text().len())
+    {
+        text.replace_range(folder.span(), &toml::Value::from(absolute).to_string());
+    }
+    text
 }
 
 /// Type of LinuxCNC's switchable kinematics: 0 is the one the machine starts with.
@@ -102,16 +122,26 @@ fn ini(file: &MachineFile, machine: &Machine, module: Option<Module>, travel: &T
         t.push_str(
             "# The machine's own M codes: which mechanism or form is active (motion.switchkins-type).\n",
         );
-        t.push_str("HAL_PIN_VARS = 1\nSUBROUTINE_PATH = remap\n");
+        t.push_str("HAL_PIN_VARS = 1\n");
         for switch in &machine.switches {
             let _ = writeln!(t, "REMAP = M{0} modalgroup=10 ngc=m{0}", switch.code);
         }
+    }
+    for code in &machine.program.remaps {
+        let _ = writeln!(t, "REMAP = {}", code.written);
+    }
+    let mut folders = subroutine_path(machine);
+    if !machine.switches.is_empty() {
+        folders.insert(0, "remap".to_owned());
+    }
+    if !folders.is_empty() {
+        let _ = writeln!(t, "SUBROUTINE_PATH = {}", folders.join(":"));
     }
     let _ = write!(
         t,
         "\n[EMCMOT]\nEMCMOT = motmod\nCOMM_TIMEOUT = 4.0\n# ns\nSERVO_PERIOD = {}\n\
          # For software stepping (stepgen.hal) write {base}: half a step of the fastest joint ({:.0} steps/s).{}\nBASE_PERIOD = 0\n\n\
-         [EMCIO]\nEMCIO = io\nCYCLE_TIME = 0.100\nTOOL_TABLE = tool.tbl\n\n\
+         [EMCIO]\nEMCIO = io\nCYCLE_TIME = 0.100\nTOOL_TABLE = tool.tbl\nRANDOM_TOOLCHANGER = {}\n\n\
          [HAL]\nHALFILE = {name}.hal\n",
         machine.servo_period_ns,
         fastest_step_rate(machine),
@@ -120,6 +150,7 @@ fn ini(file: &MachineFile, machine: &Machine, module: Option<Module>, travel: &T
         } else {
             ""
         },
+        u8::from(machine.program.random_tool_changer),
     );
     if module.is_some() {
         t.push_str("# The geometry. Without it the module refuses every pose: no machine moves with another machine's dimensions.\nHALFILE = geometry.hal\n");

@@ -2,11 +2,13 @@
 
 use crate::ini::Ini;
 use crate::modules::{MODULES, visit};
+use pkm_gcode::{Remap, Settings};
 use pkm_kins::*;
 use pkm_machine::kinematics::Parameters;
 use pkm_machine::{MachineFile, shipped};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::path::Path;
 
 /// What was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -32,11 +34,16 @@ fn refuse<T>(code: &'static str, message: String, help: &str) -> Result<T, Impor
     Err(ImportError { code, message, help: help.to_owned() })
 }
 
-/// Reads an INI file's text; `read` gives the text of a file it names.
+/// Reads an INI file's text. `folder` is the INI file's, as seen from where the machine file will be; `read` gives the text of
+/// a file that the INI names.
 ///
 /// # Errors
 /// No INI of LinuxCNC, kinematics that `pkm` does not have, a geometry that is not complete.
-pub fn import(ini: &str, read: &dyn Fn(&str) -> Option<String>) -> Result<Imported, ImportError> {
+pub fn import(
+    ini: &str,
+    folder: &Path,
+    read: &dyn Fn(&str) -> Option<String>,
+) -> Result<Imported, ImportError> {
     let (ini, missing) = Ini::included(ini, read);
     let ini = Ini::parse(&ini);
     if !ini.has("KINS") || !ini.has("JOINT_0") {
@@ -52,7 +59,7 @@ pub fn import(ini: &str, read: &dyn Fn(&str) -> Option<String>) -> Result<Import
         );
     }
     let remarks = missing.iter().map(|name| format!("#INCLUDE {name} cannot be read")).collect();
-    let mut import = Import { hal: Hal::default(), remarks, inch: 1.0, ini: &ini };
+    let mut import = Import { hal: Hal::default(), remarks, inch: 1.0, ini: &ini, folder };
     import.read_hal(read);
     let units = ini.get("TRAJ", "LINEAR_UNITS").unwrap_or("mm").to_ascii_lowercase();
     import.inch = match (units.as_str(), units.parse::<f64>()) {
@@ -86,6 +93,7 @@ struct Import<'a> {
     remarks: Vec<String>,
     /// mm per unit of length.
     inch: f64,
+    folder: &'a Path,
 }
 
 /// The geometry, as written and as a mechanism.
@@ -190,7 +198,62 @@ impl Import<'_> {
                 let _ = writeln!(t, "\n[[switch]]\ncode = {code}\nto = \"{}\"", to.trim());
             }
         }
+        self.program(&mut t);
         Ok(t)
+    }
+
+    /// `[program]`: remapped codes, where subs are, the tool changer.
+    fn program(&mut self, t: &mut String) {
+        let ini = self.ini;
+        let ours = ini.has("PKM");
+        let mut lines = String::new();
+        let mut remaps: Vec<Remap> = Vec::new();
+        for text in ini.all("RS274NGC", "REMAP") {
+            let words = text.split('#').next().unwrap_or_default().split_whitespace();
+            let text = words.collect::<Vec<_>>().join(" ");
+            let code = text.split_whitespace().next().unwrap_or_default();
+            let switches = ini.all("PKM", "SWITCH").filter_map(|switch| switch.split_once(' '));
+            if switches.into_iter().any(|(number, _)| code.strip_prefix('M') == Some(number)) {
+                continue;
+            }
+            let why = match Remap::parse(&text, &Settings::default()) {
+                Ok(remap) if remaps.iter().any(|known| known.is_of_the_code_of(&remap)) => {
+                    "this code is remapped already".to_owned()
+                }
+                Ok(remap) => {
+                    let _ = writeln!(lines, "    {},", quoted(&text));
+                    remaps.push(remap);
+                    continue;
+                }
+                Err(error) => format!("{} ({})", error.message, error.help),
+            };
+            let text = text.replace(char::is_control, " ");
+            let _ = writeln!(lines, "    # left out: {}", quoted(&text));
+            self.remark(format!(
+                "REMAP = {text} is left out, so that {code} is the built-in code or none: {why}"
+            ));
+        }
+        if !lines.is_empty() {
+            lines = format!("remap = [\n{lines}]\n");
+        }
+        // What `pkm linuxcnc` writes has its own codes in remap/.
+        let mut folders = if ours { vec![] } else { ini.folders("DISPLAY", "PROGRAM_PREFIX", self.folder) };
+        let path = ini.folders("RS274NGC", "SUBROUTINE_PATH", self.folder);
+        folders.extend(path.into_iter().filter(|folder| !(ours && *folder == self.folder.join("remap"))));
+        if !folders.is_empty() {
+            let folders: Vec<String> =
+                folders.iter().map(|folder| quoted(&folder.display().to_string())).collect();
+            let _ = writeln!(lines, "subroutine_path = [{}]", folders.join(", "));
+        }
+        match ini.get("EMCIO", "RANDOM_TOOLCHANGER").map(str::to_ascii_lowercase).as_deref() {
+            None | Some("0" | "no" | "false" | "off" | "") => {}
+            Some("1" | "yes" | "true" | "on") => lines.push_str("random_tool_changer = true\n"),
+            Some(value) => self
+                .remark(format!("[EMCIO]RANDOM_TOOLCHANGER = {value} is neither 0 nor 1: 0 stands for it")),
+        }
+        if !lines.is_empty() {
+            let _ = write!(t, "\n[program]\n{lines}");
+        }
     }
 
     /// P of G64 in the start-up code.
@@ -508,6 +571,11 @@ impl Import<'_> {
             ),
         }
     }
+}
+
+/// A text as TOML has it.
+fn quoted(text: &str) -> String {
+    toml::Value::from(text).to_string()
 }
 
 /// Inches in mm, without the rounding of the product: 1.2 in is 30.48 mm. Millimetres and degrees stay as they are.

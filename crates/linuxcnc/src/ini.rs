@@ -1,6 +1,8 @@
 //! LinuxCNC's INI files: sections and keys are case-sensitive, `#` and `;` begin a comment only at the start of a line, a key may
 //! be repeated, a `\` at the end continues the line.
 
+use std::path::{Path, PathBuf};
+
 /// An INI file as read.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Ini {
@@ -75,6 +77,16 @@ impl Ini {
     /// True if the section has any entry.
     pub fn has(&self, section: &str) -> bool {
         self.entries.iter().any(|(s, _, _)| s == section)
+    }
+
+    /// The folders of a key, separated by colons; relative ones begin at `beside`, the INI file's folder, `~` at home.
+    pub fn folders(&self, section: &str, key: &str, beside: &Path) -> Vec<PathBuf> {
+        let folders = self.get(section, key).unwrap_or_default().split(':').map(str::trim);
+        let folder = |folder: &str| match folder.strip_prefix('~').filter(|rest| rest.starts_with('/')) {
+            Some(rest) => std::env::home_dir().unwrap_or_default().join(&rest[1..]),
+            None => beside.join(folder.trim_start_matches("./")),
+        };
+        folders.filter(|folder| !folder.is_empty()).map(folder).collect()
     }
 
     /// `[SECTION]KEY` and `[SECTION](KEY)` in a word of a HAL file replaced by their values, as halcmd does; unknown ones stay.

@@ -7,6 +7,7 @@ use pkm_linuxcnc_kins::pkm_kins::*;
 use pkm_linuxcnc_kins::switchable::{HvMachineKins, OxGlideKins};
 use pkm_machine::kinematics::Parameters;
 use pkm_machine::{Machine, MachineFile, shipped};
+use std::path::Path;
 
 fn of(name: &str, text: &str) -> (Machine, Configuration) {
     let file = MachineFile::parse(name, text, &[]).unwrap();
@@ -24,7 +25,7 @@ fn import_of_the_configuration_keeps_every_number() {
     for (name, text) in shipped::SHIPPED {
         let (before, configuration) = of(name, text);
         let ini = read(&configuration, &configuration.ini).unwrap();
-        let imported = import(ini, &|file| read(&configuration, file).map(str::to_owned))
+        let imported = import(ini, Path::new(""), &|file| read(&configuration, file).map(str::to_owned))
             .unwrap_or_else(|error| panic!("{name}: {error:?}"));
         assert!(imported.remarks.is_empty(), "{name}: {:?}", imported.remarks);
         let after = Machine::parse(name, &imported.toml, &[])
@@ -120,7 +121,7 @@ const FOREIGN_HAL: &str = "# stepconf\nloadrt stepgen step_type=0,0,0\nnet xpos-
 #[test]
 fn reads_a_foreign_configuration_in_inches() {
     let read = |file: &str| (file == "a.hal").then(|| FOREIGN_HAL.to_owned());
-    let imported = import(FOREIGN, &read).unwrap();
+    let imported = import(FOREIGN, Path::new(""), &read).unwrap();
     let machine =
         Machine::parse("foreign", &imported.toml, &[]).unwrap_or_else(|e| panic!("{e:?}\n{}", imported.toml));
     assert_eq!(machine.name, "My-Router-");
@@ -144,10 +145,11 @@ fn reads_a_foreign_configuration_in_inches() {
 #[test]
 fn units_may_be_a_number_and_geometry_the_modules_own() {
     let none = |_: &str| None;
-    let inches = import(FOREIGN, &none).unwrap();
-    assert_eq!(import(&FOREIGN.replace("= inch", "= 0.03937"), &none), Ok(inches));
+    let inches = import(FOREIGN, Path::new(""), &none).unwrap();
+    assert_eq!(import(&FOREIGN.replace("= inch", "= 0.03937"), Path::new(""), &none), Ok(inches));
     let delta =
-        import(&FOREIGN.replace("trivkins", "lineardeltakins").replace("inch", "1.0"), &none).unwrap();
+        import(&FOREIGN.replace("trivkins", "lineardeltakins").replace("inch", "1.0"), Path::new(""), &none)
+            .unwrap();
     assert!(delta.toml.contains("joint_length_mm = 269.0\njoint_radius_mm = 130.25\n"), "{}", delta.toml);
     assert!(delta.remarks.iter().any(|remark| remark.contains("lineardeltakins.R is not set")));
     assert!(Machine::parse("delta", &delta.toml, &[]).is_ok());
@@ -156,7 +158,7 @@ fn units_may_be_a_number_and_geometry_the_modules_own() {
 #[test]
 fn refuses_what_it_cannot_read() {
     let none = |_: &str| None;
-    let code = |ini: &str| import(ini, &none).unwrap_err().code;
+    let code = |ini: &str| import(ini, Path::new(""), &none).unwrap_err().code;
     assert_eq!(code(""), "linuxcnc-ini");
     assert_eq!(code("\u{0}\u{ff}[[]=\\"), "linuxcnc-ini");
     assert_eq!(code(&FOREIGN.replace("trivkins", "pumakins")), "linuxcnc-kinematics");

@@ -62,6 +62,9 @@ pub struct Tables {
     /// `[probe]`
     #[serde(default)]
     pub probe: Probe,
+    /// `[program]`
+    #[serde(default)]
+    pub program: Program,
     /// `[driver]`: for every joint that has none of its own.
     pub driver: Option<Spanned<Driver>>,
     /// `[[joint]]`, in joint order.
@@ -143,6 +146,21 @@ pub struct Probe {
     /// What the probe can touch; see [`crate::workpiece`].
     #[serde(default)]
     pub workpiece: Vec<Spanned<String>>,
+}
+
+/// `[program]`: what programs of this machine mean; see [`crate::ProgramSettings`].
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Program {
+    /// Codes that subs stand for, each as LinuxCNC's INI file has it behind `REMAP =`.
+    #[serde(default)]
+    pub remap: Vec<Spanned<String>>,
+    /// Folders of subroutine files; relative ones begin where the machine file is.
+    #[serde(default)]
+    pub subroutine_path: Vec<Spanned<String>>,
+    /// M6 exchanges the tool with the one in the spindle; no if absent.
+    #[serde(default)]
+    pub random_tool_changer: bool,
 }
 
 /// `[driver]` or a joint's `driver`: a known model or own minima, and the times to use (the minima if absent).

@@ -5,6 +5,7 @@ use crate::drivers::DriverTiming;
 use crate::file::{self, MachineFile, Number};
 use crate::homing::{self, Homing, JointHoming};
 use crate::joint::joints;
+use crate::program::{ProgramSettings, program};
 use crate::source::Findings;
 use crate::switch::{Switch, switches};
 use crate::workpiece::{Solid, solid};
@@ -45,6 +46,8 @@ pub struct Machine {
     pub singularity: SingularityGuard,
     /// M codes that switch the mechanism, each code once.
     pub switches: Vec<Switch>,
+    /// What programs may say beyond the language.
+    pub program: ProgramSettings,
     /// What the spindle can do.
     pub spindle: SpindleSettings,
     /// What the probe can touch, machine coordinates, mm; nothing: there is no probe.
@@ -207,6 +210,7 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
         homing::check(tables, mechanism, joints, home, singularity, findings);
     }
     let switches = mechanism.as_ref().and_then(|mechanism| switches(tables, mechanism, findings));
+    let program = program(file, switches.as_deref().unwrap_or_default(), findings);
     let spindle = spindle(tables, findings);
     let workpiece = workpiece(tables, findings);
     Some(Machine {
@@ -224,6 +228,7 @@ fn build(file: &MachineFile, findings: &mut Findings<'_>) -> Option<Machine> {
         path: path?,
         singularity: singularity?,
         switches: switches?,
+        program: program?,
         spindle: spindle?,
         workpiece: workpiece?,
     })

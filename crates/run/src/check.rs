@@ -6,14 +6,14 @@
 use crate::probing::contact;
 use crate::program::Program;
 use crate::setup::{
-    Events, HostLimits, face, frame, inside, interpreter, limits, settings, skip_to_line, tell_probe,
+    Events, HostLimits, face, frame, inside, interpreter, limits, open, settings, skip_to_line, tell_probe,
 };
 use crate::switch::switched;
 use crate::synchronised::judge;
 use crate::{Options, messages};
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_canon::{FileId, Span};
-use pkm_gcode::{Settings, Status};
+use pkm_gcode::{LineSource, Remap, Status, static_check};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{JointRange, Kinematics, Pose, Singularity};
 use pkm_machine::Machine;
@@ -60,11 +60,16 @@ impl Checked {
     pub(crate) fn add_static(
         &mut self,
         program: &Program,
-        settings: &Settings,
+        machine: Option<&Machine>,
         options: &Options,
     ) -> Result<(), Diagnostic> {
-        let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
-        let found = pkm_gcode::static_check(&mut *source, settings, options.parameters, &program.name());
+        let mut source = open(program, machine)?;
+        let remaps: Vec<Remap> = machine
+            .into_iter()
+            .flat_map(|machine| machine.program.remaps.iter().map(|code| code.remap.clone()))
+            .collect();
+        let settings = settings(machine, options);
+        let found = static_check(&mut source, &settings, &remaps, options.parameters, &program.name());
         for finding in found {
             let same_line = |b: &&mut Diagnostic| {
                 b.severity == Severity::Error && (finding.line, &finding.file) == (b.line, &b.file)
@@ -142,7 +147,7 @@ pub fn check_with(
     seen: impl FnMut(&Programmed<'_>),
 ) -> Result<Checked, Diagnostic> {
     let mut checked = interpret(program, machine, options, seen)?;
-    checked.add_static(program, &settings(Some(machine), options), options)?;
+    checked.add_static(program, Some(machine), options)?;
     checked.sort(program);
     Ok(checked)
 }
@@ -167,13 +172,13 @@ fn interpret(
         checked.add(program, finding);
     }
     let mut interpreter = interpreter(machine, options, &start);
-    let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
+    let mut source = open(program, Some(machine))?;
     let mut frame = frame(machine, &start);
     let workpiece = options.workpiece(machine);
     let mut probed = None;
     let mut queue = VecDeque::new();
     let mut sink = Events { frame: &mut frame, queue: &mut queue };
-    if let Err(finding) = skip_to_line(&mut interpreter, program, &mut *source, options, &start, &mut sink) {
+    if let Err(finding) = skip_to_line(&mut interpreter, program, &mut source, options, &start, &mut sink) {
         checked.add(program, finding);
         return Ok(checked);
     }
@@ -181,9 +186,9 @@ fn interpret(
     let mut approaches = options.start_line.is_some();
     loop {
         let mut sink = Events { frame: &mut frame, queue: &mut queue };
-        let stepped = interpreter.step(&mut *source, &mut sink);
+        let stepped = interpreter.step(&mut source, &mut sink);
         if let Err(error) = &stepped {
-            let finding = interpreter.diagnose(error, &*source, &program.name());
+            let finding = interpreter.diagnose(error, &source, &program.name());
             checked.add(program, finding);
             if checked.is_full() || interpreter.has_ended() {
                 return Ok(checked);
@@ -191,7 +196,7 @@ fn interpret(
             // A block at fault moves nothing, but what it sets and where it leads holds for the blocks behind it.
             queue.retain(|(event, _)| matches!(event, Event::MachineCode(_)));
             let mut sink = Events { frame: &mut frame, queue: &mut queue };
-            interpreter.go_on(&mut *source, &mut sink);
+            interpreter.go_on(&mut source, &mut sink);
             queue.retain(|(event, _)| matches!(event, Event::MachineCode(_)));
             if let Some((number, span)) = interpreter.lost_machine_code().filter(|_| queue.is_empty()) {
                 queue.push_back((Event::MachineCode(number), span));
@@ -200,7 +205,7 @@ fn interpret(
             }
         }
         if let Some(notice) = interpreter.take_notice() {
-            let finding = interpreter.diagnose(&notice, &*source, &program.name());
+            let finding = interpreter.diagnose(&notice, &source, &program.name());
             checked.add(program, Diagnostic { severity: Severity::Note, ..finding });
         }
         let switches = matches!(queue.front(), Some((Event::MachineCode(_), _)));
@@ -264,7 +269,7 @@ fn interpret(
             for mut finding in findings {
                 // In a sub: its own file, and the calls that led there.
                 finding.file = source.file_name(span.file).unwrap_or(finding.file);
-                finding.notes.extend(interpreter.call_notes(&*source, &program.name()));
+                finding.notes.extend(interpreter.call_notes(&source, &program.name()));
                 checked.add(program, finding);
             }
             if cannot_go_on {

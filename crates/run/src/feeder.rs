@@ -6,14 +6,14 @@ use crate::deviation::Programmed;
 use crate::probing::Probing;
 use crate::program::Program;
 use crate::setup::{
-    Events, HostLimits, HostPlanner, face, frame, interpreter, limits, skip_to_line, tell_probe,
+    Events, HostLimits, HostPlanner, face, frame, interpreter, limits, open, skip_to_line, tell_probe,
 };
 use crate::switch::{FormSwitchDrive, switched};
 use crate::synchronised::{MOST_MOVES, SynchronisedDrive};
 use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::{Probe, Span};
-use pkm_gcode::{Interpreter, LineSource, Parameters, Status};
+use pkm_gcode::{FileSource, Interpreter, Parameters, Status};
 use pkm_hal_sim::{Feedback, Operator, Orient, Setpoint, SetpointSource, Simulation, SpindleCommand};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Joints, Kinematics, Pose};
@@ -66,7 +66,7 @@ pub(crate) struct Feeder<'a> {
     program: &'a Program,
     machine: &'a Machine,
     interpreter: Interpreter,
-    source: Box<dyn LineSource + 'a>,
+    source: FileSource<'a>,
     frame: Frame,
     planner: Box<HostPlanner>,
     /// The mechanism in force: of the machine file until a program switches.
@@ -142,11 +142,11 @@ impl<'a> Feeder<'a> {
         let window = machine.path.smoothing_periods as usize * options.substeps.max(1) as usize;
         let setpoint = *planner.setpoint();
         let smoother = (window > 1).then(|| Box::new(Smoother::new(window, setpoint.joints)));
-        let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
+        let mut source = open(program, Some(machine))?;
         let mut interpreter = interpreter(machine, options, &start);
         let (mut frame, mut queue) = (frame(machine, &start), VecDeque::new());
         let mut sink = Events { frame: &mut frame, queue: &mut queue };
-        skip_to_line(&mut interpreter, program, &mut *source, options, &start, &mut sink)?;
+        skip_to_line(&mut interpreter, program, &mut source, options, &start, &mut sink)?;
         // Nothing of what was skipped moves the machine; the spindle turns as it then would.
         queue.retain(|(event, _)| matches!(event, Event::Spindle(_)));
         Ok(Self {
@@ -329,14 +329,14 @@ impl<'a> Feeder<'a> {
 
     fn step(&mut self) {
         let mut sink = Events { frame: &mut self.frame, queue: &mut self.queue };
-        match self.interpreter.step(&mut *self.source, &mut sink) {
+        match self.interpreter.step(&mut self.source, &mut sink) {
             Ok(status) => {
                 self.blocks += 1;
                 self.program_ended = status == Status::Ended;
                 self.synch = status == Status::Synch;
             }
             Err(error) => {
-                let failure = self.interpreter.diagnose(&error, &*self.source, &self.program.name());
+                let failure = self.interpreter.diagnose(&error, &self.source, &self.program.name());
                 self.fail(failure);
             }
         }

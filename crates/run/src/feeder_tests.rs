@@ -158,12 +158,12 @@ fn every_feed_mode_uses_the_one_feed_length() {
             let per_move = if feed.ends_with("G93") { "F4" } else { "" };
             let text = format!("{feed}\nG1 {words} {per_move}\nM2\n");
             let program = program(&text);
-            let mut source = program.open().unwrap();
+            let mut source = program.open(&[]).unwrap();
             let mut interpreter = prepared(settings(None, &Options::default()), &Options::default());
             let mut frame = Frame::new([0.0; 9], Tolerance { length_mm: 0.01, angle_rad: BLEND_RAD });
             let mut queue = VecDeque::new();
             let mut sink = Events { frame: &mut frame, queue: &mut queue };
-            while interpreter.step(&mut *source, &mut sink).unwrap() != Status::Ended {}
+            while interpreter.step(&mut source, &mut sink).unwrap() != Status::Ended {}
             let found: Vec<Move> = queue
                 .iter()
                 .filter_map(|(event, _)| if let Event::Move(step) = event { Some(*step) } else { None })

@@ -1,9 +1,9 @@
 //! What can be said of a program without a machine: its language alone.
 
+use crate::Options;
 use crate::check::Checked;
 use crate::program::Program;
-use crate::setup::{prepared, settings};
-use crate::{Options, messages};
+use crate::setup::{open, prepared, settings};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::{Canon, CanonSink, Span};
 use pkm_gcode::canon_text_of;
@@ -43,21 +43,21 @@ pub fn check_language(program: &Program, options: &Options) -> Result<Checked, D
     let name = program.name();
     let mut checked = Checked::default();
     let mut interpreter = prepared(settings, options);
-    let mut source = program.open().map_err(|e| messages::unreadable(program, &e))?;
+    let mut source = open(program, None)?;
     let mut count = Count::default();
     let begun = match options.start_line {
-        Some(line) => interpreter.skip_to_line(line, &mut *source, &mut count),
+        Some(line) => interpreter.skip_to_line(line, &mut source, &mut count),
         None => Ok(()),
     };
     match begun {
-        Err(error) => checked.add(program, interpreter.diagnose(&error, &*source, &name)),
-        Ok(()) => canon_text_of(&mut interpreter, &mut *source, &mut count, |error, interpreter, source| {
+        Err(error) => checked.add(program, interpreter.diagnose(&error, &source, &name)),
+        Ok(()) => canon_text_of(&mut interpreter, &mut source, &mut count, |error, interpreter, source| {
             checked.add(program, interpreter.diagnose(error, source, &name));
             !checked.is_full()
         }),
     }
     (checked.blocks, checked.moves) = (count.blocks, count.moves);
-    checked.add_static(program, &settings, options)?;
+    checked.add_static(program, None, options)?;
     checked.sort(program);
     Ok(checked)
 }

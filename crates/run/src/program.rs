@@ -1,6 +1,6 @@
 //! Where a program comes from. It is read twice (check, then run), so a pipe is kept in memory; a file is streamed.
 
-use pkm_gcode::{FileSource, LineSource, MemorySource};
+use pkm_gcode::FileSource;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::PathBuf;
@@ -39,14 +39,17 @@ impl Program {
         })
     }
 
-    /// Opens it at its first line. Subroutine files are looked for beside the program.
-    pub(crate) fn open(&self) -> io::Result<Box<dyn LineSource + '_>> {
+    /// Opens it at its first line. Subroutine files are looked for beside the program, then in these folders.
+    ///
+    /// # Errors
+    /// The file cannot be opened.
+    pub fn open(&self, subroutine_path: &[PathBuf]) -> io::Result<FileSource<'_>> {
         Ok(match self {
             Program::File(path) => {
-                let beside = path.parent().map(PathBuf::from).into_iter().collect();
-                Box::new(FileSource::open(path, beside)?)
+                let beside = path.parent().into_iter().map(PathBuf::from);
+                FileSource::open(path, beside.chain(subroutine_path.iter().cloned()).collect())?
             }
-            Program::Memory { text, .. } => Box::new(MemorySource::new(text)),
+            Program::Memory { name, text } => FileSource::of_text(name, text, subroutine_path.to_vec()),
         })
     }
 }

@@ -4,7 +4,7 @@ use crate::program::Program;
 use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::{Canon, CanonSink, Span};
-use pkm_gcode::{Interpreter, LineSource, MachineCodes, Settings};
+use pkm_gcode::{FileSource, Interpreter, LineSource, MachineCodes, Settings};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Kinematics, Pose, maths};
 use pkm_machine::Machine;
@@ -36,8 +36,28 @@ pub(crate) fn settings(machine: Option<&Machine>, options: &Options) -> Settings
         // A machine has no more codes than the interpreter takes.
         machine_codes: MachineCodes::new(&codes).unwrap_or_default(),
         axes: machine.mechanism.axes(),
+        random_toolchanger: machine.program.random_tool_changer,
         ..common
     }
+}
+
+/// The program, and the subs that the machine's codes stand for.
+///
+/// # Errors
+/// The program cannot be read, or one of the subs is not found.
+pub(crate) fn open<'a>(
+    program: &'a Program,
+    machine: Option<&Machine>,
+) -> Result<FileSource<'a>, Diagnostic> {
+    let settings = machine.map(|machine| &machine.program);
+    let folders = settings.map(|settings| settings.subroutine_path.as_slice()).unwrap_or_default();
+    let mut source = program.open(folders).map_err(|e| messages::unreadable(program, &e))?;
+    for code in settings.into_iter().flat_map(|settings| &settings.remaps) {
+        if !matches!(source.find_subroutine(code.remap.sub()), Ok(Some(_))) {
+            return Err(code.missing.clone());
+        }
+    }
+    Ok(source)
 }
 
 /// An interpreter with tools and parameters as the caller gave them.
@@ -55,6 +75,9 @@ pub(crate) fn prepared(settings: Settings, options: &Options) -> Interpreter {
 /// The interpreter of a machine that stands at `start`.
 pub(crate) fn interpreter(machine: &Machine, options: &Options, start: &Pose) -> Interpreter {
     let mut interpreter = prepared(settings(Some(machine), options), options);
+    for code in &machine.program.remaps {
+        interpreter.add_remap(code.remap.clone());
+    }
     interpreter.set_machine_position_mm(face(&start.to_array()));
     interpreter
 }

@@ -125,11 +125,7 @@ impl Interpreter {
         source: &mut dyn LineSource,
     ) -> Result<(), Error> {
         let Some(remap) = self.state.remaps.get(index) else { return Ok(()) };
-        let span = match remap.code {
-            Remapped::M(_, group) => block.m_span(group),
-            Remapped::G(_) => block.g_span(GGroup::Motion),
-            Remapped::Word(letter) => block.word_span(letter),
-        };
+        let span = remap.code.place_in(&block).unwrap_or_default();
         let words = self.words_for(remap, &block, span)?;
         let (sub, positional) = (remap.sub.clone(), remap.arguments.contains('@'));
         let mut arguments = [0.0; ARGUMENTS];
@@ -191,16 +187,13 @@ impl Interpreter {
 impl State {
     /// The step in which a block executes a code, and whether it is a built-in one; `None` if it does not hold it.
     fn step_of(&self, code: Remapped, block: &Block) -> Option<(u8, bool)> {
-        let held = match code {
-            Remapped::M(number, group) => block.m(group) == Some(number),
-            Remapped::G(number) => block.g(GGroup::Motion) == Some(number),
-            Remapped::Word(b'F') => {
-                let mode = block.g(GGroup::FeedMode);
-                let inverse = mode.map_or(self.modal.feed_mode == FeedMode::InverseTime, |code| code == 930);
-                block.has(b'F') && !inverse
+        if code == Remapped::Word(b'F') {
+            let mode = block.g(GGroup::FeedMode);
+            if mode.map_or(self.modal.feed_mode == FeedMode::InverseTime, |code| code == 930) {
+                return None;
             }
-            Remapped::Word(letter) => block.has(letter),
-        };
+        }
+        code.place_in(block)?;
         let built_in = match code {
             Remapped::M(number, _) => MGroup::of(number).is_some(),
             Remapped::G(_) => false,
@@ -213,7 +206,7 @@ impl State {
             Remapped::Word(b'S') => step::SPEED,
             Remapped::Word(_) => step::TOOL,
         };
-        held.then_some((step, built_in))
+        Some((step, built_in))
     }
 
     /// True if a block holds an M code or a free G code that a sub stands for, also within that sub.

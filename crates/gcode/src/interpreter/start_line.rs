@@ -44,7 +44,7 @@ impl Interpreter {
             source.seek(first).map_err(kind)
         };
         sought(self, source)?;
-        match nesting_at(source, &self.state.settings, line) {
+        match nesting_at(source, &self.state.settings, &self.state.remaps, line) {
             Nesting::Top => {}
             Nesting::Sub => return fail(ErrorKind::StartInSub { line }),
             Nesting::Construct => return fail(ErrorKind::StartInConstruct { line }),

@@ -15,6 +15,7 @@ use crate::interpreter::BYTE_ORDER_MARK;
 use crate::line::Line;
 use crate::modal::{GGroup, MGroup};
 use crate::parameters::Parameters;
+use crate::remap::{Remap, Remaps};
 use crate::settings::{Dialect, Settings};
 use crate::source::LineSource;
 use alloc::collections::{BTreeMap, BTreeSet};
@@ -34,15 +35,17 @@ const MOST_FILES: usize = 1000;
 /// A label or name as written.
 type Name = Vec<u8>;
 
-/// Reads the whole program without running it. `parameters`: those the program starts with, if any. `program` is its
-/// path as the person gave it.
+/// Reads the whole program without running it. `remaps`: the codes that subs stand for. `parameters`: those the program
+/// starts with, if any. `program` is its path as the person gave it.
 pub fn static_check(
     source: &mut dyn LineSource,
     settings: &Settings,
+    remaps: &[Remap],
     parameters: Option<&Parameters>,
     program: &str,
 ) -> Vec<Diagnostic> {
-    let mut check = StaticCheck::new(settings);
+    let remaps = Remaps::of(remaps);
+    let mut check = StaticCheck::new(settings, &remaps);
     check.read_file(source, true);
     check.read_called_files(source);
     check.finish(parameters);
@@ -63,8 +66,13 @@ pub(crate) enum Nesting {
 }
 
 /// How deep a line of the program stands; the source stands at its begin.
-pub(crate) fn nesting_at(source: &mut dyn LineSource, settings: &Settings, line: u32) -> Nesting {
-    let mut check = StaticCheck::new(settings);
+pub(crate) fn nesting_at(
+    source: &mut dyn LineSource,
+    settings: &Settings,
+    remaps: &Remaps,
+    line: u32,
+) -> Nesting {
+    let mut check = StaticCheck::new(settings, remaps);
     check.wanted_line = line;
     check.read_file(source, true);
     check.nesting
@@ -94,6 +102,7 @@ enum Region {
 
 struct StaticCheck<'a> {
     settings: &'a Settings,
+    remaps: &'a Remaps,
     line: Line,
     block: Block,
     findings: Vec<Finding>,
@@ -125,9 +134,10 @@ struct StaticCheck<'a> {
 }
 
 impl<'a> StaticCheck<'a> {
-    fn new(settings: &'a Settings) -> Self {
+    fn new(settings: &'a Settings, remaps: &'a Remaps) -> Self {
         Self {
             settings,
+            remaps,
             line: Line::new(),
             block: Block::new(),
             findings: Vec::new(),
@@ -251,7 +261,7 @@ impl<'a> StaticCheck<'a> {
             self.quirks();
         }
         let reader = crate::block::Reader {
-            remaps: &crate::remap::NO_REMAPS,
+            remaps: self.remaps,
             axes: self.axes_here(),
             diameter: false,
             spindles: self.settings.spindles.min(8),
@@ -271,16 +281,30 @@ impl<'a> StaticCheck<'a> {
         self.take_ends();
         if let Some(number) = self.block.m(MGroup::User)
             && !self.settings.machine_codes.contains(number)
+            && self.remaps.m_group(number).is_none()
         {
             let span = self.block.m_span(MGroup::User);
             self.add(ErrorKind::MUnsupported { number }, span, Severity::Error);
         }
+        self.take_remapped();
         if let Some(700 | 710..=712 | 720..=722) = self.block.g(GGroup::Motion)
             && self.block.has(b'Q')
         {
             let label = self.number_label(b'Q');
             self.takes_profile(label.as_ref());
             self.calls_sub(label, self.block.word_span(b'Q'));
+        }
+    }
+
+    /// Remapped codes call their subs, which get the words as names.
+    fn take_remapped(&mut self) {
+        for (_, remap) in self.remaps.iter() {
+            let Some(span) = remap.code.place_in(&self.block) else { continue };
+            let sub = remap.sub().as_bytes().to_vec();
+            for name in remap.names() {
+                self.reads.set(&sub, &names::Parameter::Name([name].into()));
+            }
+            self.calls_sub(Some(sub), span);
         }
     }
 

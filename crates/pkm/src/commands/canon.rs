@@ -12,15 +12,10 @@ use crate::render::diagnostics::{Json, Messages};
 use pkm_canon::diagnostic::Diagnostic;
 use pkm_canon::text::{Spelling, TextWriter};
 use pkm_canon::{CanonSink, FileId, Motion9Writer};
-use pkm_gcode::{
-    Error, FileSource, Interpreter, LineSource, MemorySource, Place, Settings, SourceError, ToolTable,
-    canon_text_of,
-};
-use pkm_run::Program;
+use pkm_gcode::{Error, Interpreter, LineSource, Place, Settings, SourceError, ToolTable, canon_text_of};
 use serde_json::json;
 use std::cell::{Cell, RefCell};
 use std::io::{self, BufWriter, Write, stdout};
-use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Failure> {
@@ -52,21 +47,14 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
         }
         None => None,
     };
-    let mut source: Box<dyn LineSource> = match &program {
-        Program::File(path) => {
-            // Subroutine files are looked for beside the program.
-            let beside = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-            let mut folders = vec![beside];
-            folders.extend(ini.as_ref().map(Ini::subroutine_path).unwrap_or_default());
-            Box::new(FileSource::open(path, folders).map_err(|error| {
-                let message = format!("cannot read {name}: {error}");
-                Failure::could_not("file-open", &name, message, "check the path and its permissions")
-            })?)
-        }
-        Program::Memory { text, .. } => Box::new(MemorySource::new(text)),
-    };
+    // Subroutine files are looked for beside the program first.
+    let folders = ini.as_ref().map(Ini::subroutine_path).unwrap_or_default();
+    let mut source = program.open(&folders).map_err(|error| {
+        let message = format!("cannot read {name}: {error}");
+        Failure::could_not("file-open", &name, message, "check the path and its permissions")
+    })?;
     if let Some(ini) = &ini {
-        ini.remap(&settings, &mut interpreter, source.as_mut())?;
+        ini.remap(&settings, &mut interpreter, &mut source)?;
     }
     let mut failed = false;
     let report = |diagnostic: &Diagnostic, line: &[u8]| {
@@ -79,13 +67,13 @@ pub(crate) fn run(arguments: &Canon, messages: &Messages) -> Result<Outcome, Fai
     match &arguments.output {
         None => {
             let writer = BufWriter::with_capacity(1 << 16, stdout().lock());
-            print(arguments, &mut interpreter, source.as_mut(), writer, report)?;
+            print(arguments, &mut interpreter, &mut source, writer, report)?;
         }
         Some(path) => {
             let told = |error: io::Error| output::failure(path, &error);
             let interrupted = interrupt::flag();
             let file = Interruptible { file: output::Target::open(path).map_err(told)?, by: &interrupted };
-            let printed = print(arguments, &mut interpreter, source.as_mut(), BufWriter::new(file), report);
+            let printed = print(arguments, &mut interpreter, &mut source, BufWriter::new(file), report);
             if interrupted.load(Ordering::Relaxed) {
                 let message = format!("interrupted: {} is as it was", path.display());
                 messages.print(&[outcome::warning("interrupted", &name, message, "run it again")]);

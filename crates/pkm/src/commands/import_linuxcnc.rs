@@ -8,7 +8,7 @@ use pkm_canon::diagnostic::Diagnostic;
 use pkm_machine::Machine;
 use std::ffi::OsStr;
 use std::io::{Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The largest INI or HAL file that is read.
 const MAX_BYTES: u64 = 1 << 20;
@@ -21,7 +21,16 @@ pub(crate) fn run(arguments: &ImportLinuxcnc, messages: &Messages) -> Result<Out
         Failure::could_not("linuxcnc-ini", &shown, message, "give the INI file of a LinuxCNC configuration")
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let imported = pkm_linuxcnc::import(&text, &|name| read(&folder.join(name)).ok())
+    // Where folders of subroutines begin: beside the INI file the machine file finds them by the same words.
+    let beside = |output: &Path| {
+        let real = |folder: &Path| std::fs::canonicalize(Path::new(".").join(folder)).ok();
+        real(output.parent().unwrap_or(Path::new(""))) == real(folder)
+    };
+    let seen = match &arguments.output {
+        Some(output) if beside(output) => PathBuf::new(),
+        _ => std::path::absolute(Path::new(".").join(folder)).unwrap_or_default(),
+    };
+    let imported = pkm_linuxcnc::import(&text, &seen, &|name| read(&folder.join(name)).ok())
         .map_err(|error| Failure::could_not(error.code, &shown, error.message, &error.help))?;
     let remarks: Vec<Diagnostic> = imported
         .remarks

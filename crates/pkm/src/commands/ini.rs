@@ -138,13 +138,9 @@ impl Ini {
     /// relative ones begin where the INI file is.
     pub(crate) fn subroutine_path(&self) -> Vec<PathBuf> {
         let beside = self.path.parent().unwrap_or(Path::new(""));
-        let folders = |section, key| self.entries.get(section, key).unwrap_or_default().split(':');
-        folders("DISPLAY", "PROGRAM_PREFIX")
-            .chain(folders("RS274NGC", "SUBROUTINE_PATH"))
-            .map(str::trim)
-            .filter(|folder| !folder.is_empty())
-            .map(|folder| beside.join(folder))
-            .collect()
+        let mut folders = self.entries.folders("DISPLAY", "PROGRAM_PREFIX", beside);
+        folders.extend(self.entries.folders("RS274NGC", "SUBROUTINE_PATH", beside));
+        folders
     }
 }
 
