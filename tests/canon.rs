@@ -1,6 +1,7 @@
 //! `pkm canon`: LinuxCNC's text on standard output, errors as its `rs274` shows them.
 
 use crate::support::{pkm, pkm_with_input, write};
+use std::path::Path;
 
 #[test]
 fn commands_come_in_the_text_format_of_linuxcnc() {
@@ -136,6 +137,56 @@ fn remapped_codes_come_from_the_ini_file() {
         assert_eq!(run.status, 2, "{line}");
         assert!(run.stderr.contains(said) && run.stderr.contains("help"), "{line}: {}", run.stderr);
     }
+}
+
+#[test]
+fn an_imported_machine_file_knows_the_remapped_codes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let joint = |n: u8| {
+        format!(
+            "[JOINT_{n}]\nMIN_LIMIT = -90\nMAX_LIMIT = 90\nMAX_VELOCITY = 50\nMAX_ACCELERATION = 500\nSCALE = 400\n"
+        )
+    };
+    std::fs::create_dir(folder.path().join("lc")).unwrap();
+    std::fs::create_dir(folder.path().join("lc/subs")).unwrap();
+    let ini = format!(
+        "[TRAJ]\nLINEAR_UNITS = mm\n[KINS]\nKINEMATICS = trivkins coordinates=xyz\n{}{}{}\
+         [RS274NGC]\nSUBROUTINE_PATH = subs\nREMAP = G88.1 argspec=XZ ngc=dip\n",
+        joint(0),
+        joint(1),
+        joint(2)
+    );
+    write(Path::new(&path("lc/mine.ini")), ini);
+    write(Path::new(&path("lc/subs/dip.ngc")), "o<dip> sub\nG0 X#<x>\nG1 Z#<z> F300\nG0 Z0\no<dip> endsub\n");
+    write(Path::new(&path("program.ngc")), "G21 G90\nG88.1 X10 Z-5\nG88.1 X20 Z-500\nM2\n");
+    // Beside the INI file folders stay as they are, elsewhere they begin at the root.
+    let printed = pkm(&["import-linuxcnc", &path("lc/mine.ini")]);
+    assert!(
+        printed.stdout.contains(&format!("subroutine_path = [\"{}\"]", path("lc/subs"))),
+        "{}",
+        printed.stdout
+    );
+    for (machine, folder) in
+        [("lc/mine.toml", "[\"subs\"]".to_owned()), ("mine.toml", format!("[\"{}\"]", path("lc/subs")))]
+    {
+        let machine = path(machine);
+        assert_eq!(pkm(&["import-linuxcnc", &path("lc/mine.ini"), "-o", &machine]).status, 0);
+        let text = std::fs::read_to_string(&machine).unwrap();
+        assert!(text.contains(&format!("subroutine_path = {folder}\n")), "{text}");
+        let checked = pkm(&["check", &path("program.ngc"), "--machine", &machine]);
+        assert_eq!(checked.status, 1, "{}", checked.stderr);
+        for said in ["lc/subs/dip.ngc:3:1", "program.ngc:3:1", "joint2 would have to be at -500"] {
+            assert!(checked.stderr.contains(said), "{said}: {}", checked.stderr);
+        }
+        assert!(!checked.stderr.contains("program.ngc:2:1"), "{}", checked.stderr);
+    }
+    // The canonical commands are those of the INI file.
+    let canon = pkm(&["canon", &path("program.ngc"), "--mm", "--ini", &path("lc/mine.ini")]);
+    assert!(canon.stdout.contains("STRAIGHT_FEED(10.0000, 0.0000, -5.0000"), "{}", canon.stdout);
+    let piped = std::fs::read(path("program.ngc")).unwrap();
+    let same = pkm_with_input(&["canon", "-", "--mm", "--ini", &path("lc/mine.ini")], &piped);
+    assert_eq!(same.stdout, canon.stdout);
 }
 
 #[test]

@@ -143,6 +143,16 @@ mod tests {
     }
 
     #[test]
+    fn folders_begin_beside_the_file_or_at_home() {
+        let ini = Ini::parse("[A]\nX = ./a: b/../c::/d:~/e:~f\n");
+        let home = std::env::home_dir().unwrap_or_default();
+        let beside = |folder: &str| Path::new("lc").join(folder);
+        let wanted = [beside("a"), beside("b/../c"), PathBuf::from("/d"), home.join("e"), beside("~f")];
+        assert_eq!(ini.folders("A", "X", Path::new("lc")), wanted);
+        assert_eq!(ini.folders("A", "Y", Path::new("lc")), [PathBuf::new(); 0]);
+    }
+
+    #[test]
     fn includes_are_one_level_deep() {
         let read = |name: &str| match name {
             "b.inc" => Some("[B]\nX = 1\n#INCLUDE c.inc\n".to_owned()),

@@ -175,3 +175,63 @@ fn refuses_what_it_cannot_read() {
     assert_eq!(code(&FOREIGN.replace("trivkins", "moma_kins")), "linuxcnc-units");
     assert_eq!(code(&mm.replace("trivkins", "genhexkins")), "linuxcnc-geometry");
 }
+
+#[test]
+fn remapped_codes_and_the_tool_changer_come_along() {
+    const PROGRAM: &str = "[DISPLAY]\nPROGRAM_PREFIX = ../nc\n[EMCIO]\nRANDOM_TOOLCHANGER = 1\n[RS274NGC]\n\
+        SUBROUTINE_PATH = ./subs:/shared\nREMAP =  M400  modalgroup=10 argspec=Pq ngc=corner # remark\nREMAP=M6 prolog=a ngc=b epilog=c\n\
+        REMAP = G88.1 modalgroup=1 py=involute\nREMAP = M400 ngc=again\n";
+    let none = |_: &str| None;
+    let bare = import(FOREIGN, Path::new("lc"), &none).unwrap();
+    assert!(!bare.toml.contains("[program]"), "{}", bare.toml);
+    let imported = import(&format!("{PROGRAM}{FOREIGN}"), Path::new("lc"), &none).unwrap();
+    let new: Vec<_> = imported.remarks.iter().filter(|remark| !bare.remarks.contains(remark)).collect();
+    for (remark, said) in new.iter().zip(["prolog=a needs Python", "py=involute needs Python", "already"]) {
+        assert!(remark.contains("is left out") && remark.contains(said), "{remark}");
+    }
+    assert_eq!(new.len(), 3, "{new:?}");
+
+    let program = |name: &str, toml: &str| {
+        let machine =
+            Machine::parse(name, toml, &[]).unwrap_or_else(|findings| panic!("{findings:?}\n{toml}"));
+        let settings = machine.program;
+        let written: Vec<String> = settings.remaps.into_iter().map(|code| code.written).collect();
+        let folders: Vec<String> =
+            settings.subroutine_path.iter().map(|folder| folder.display().to_string()).collect();
+        (written, folders, settings.random_tool_changer)
+    };
+    let wanted = (
+        vec!["M400 modalgroup=10 argspec=Pq ngc=corner".to_owned()],
+        ["lc/../nc", "lc/subs", "/shared"].map(str::to_owned).to_vec(),
+        true,
+    );
+    assert_eq!(program("mine.toml", &imported.toml), wanted);
+
+    // A configuration is elsewhere than the machine file: its folders begin at the root, in both files.
+    let (_, there) = of("mine.toml", &imported.toml);
+    let absolute = |folder: &String| std::path::absolute(folder).unwrap().display().to_string();
+    let wanted = (wanted.0, wanted.1.iter().map(absolute).collect(), true);
+    assert_eq!(program("lc/machine.toml", read(&there, "machine.toml").unwrap()), wanted);
+    let ini = read(&there, &there.ini).unwrap();
+    let again = import(ini, Path::new("lc"), &|file| read(&there, file).map(str::to_owned)).unwrap();
+    assert_eq!(program("mine.toml", &again.toml), wanted);
+    assert!(again.remarks.is_empty(), "{:?}", again.remarks);
+
+    // The machine's own codes are remapped in LinuxCNC, not here.
+    let text = format!(
+        "{}\n[program]\nremap = [\"M400 ngc=corner\"]\nsubroutine_path = [\"/shared\"]\n",
+        shipped::text("ox-glide-o").unwrap()
+    );
+    let (_, there) = of("ox", &text);
+    let ini = read(&there, &there.ini).unwrap();
+    for line in [
+        "REMAP = M450 modalgroup=10 ngc=m450\n",
+        "REMAP = M400 ngc=corner\n",
+        "SUBROUTINE_PATH = remap:/shared\n",
+    ] {
+        assert!(ini.contains(line), "{line}{ini}");
+    }
+    let again = import(ini, Path::new("lc"), &|file| read(&there, file).map(str::to_owned)).unwrap();
+    let wanted = (vec!["M400 ngc=corner".to_owned()], vec!["/shared".to_owned()], false);
+    assert_eq!(program("ox", &again.toml), wanted);
+}

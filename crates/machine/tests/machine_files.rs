@@ -275,3 +275,46 @@ fn unreadable_files_are_refused() {
     let dotted = format!("{}a = 1", "a.".repeat(400_000));
     refusal(Machine::parse("dotted.toml", &dotted, &[]));
 }
+
+#[test]
+fn program_says_which_codes_are_remapped() {
+    let own = |program: &str| moma_a("[home]", &format!("[program]\n{program}\n[home]"));
+    let remaps = "remap = [\"M400 modalgroup=6 argspec=Pq ngc=Corner # its own\", \"t ngc=pick\"]";
+    let machine = own(&format!("{remaps}\nsubroutine_path = [\"subs\", \"/nc\"]")).unwrap();
+    let subs: Vec<&str> = machine.program.remaps.iter().map(|code| code.remap.sub()).collect();
+    assert_eq!(subs, ["corner", "pick"]);
+    assert!(!machine.program.random_tool_changer);
+    assert!(own("random_tool_changer = true").unwrap().program.random_tool_changer);
+    // Folders begin where the machine file is.
+    let text = shipped::text("moma-a").unwrap().replacen(
+        "[home]",
+        "[program]\nsubroutine_path = [\"subs\", \"/nc\"]\n[home]",
+        1,
+    );
+    let machine = Machine::parse("shop/mine.toml", &text, &[]).unwrap();
+    let folders: Vec<_> = machine.program.subroutine_path.iter().map(|path| path.to_str().unwrap()).collect();
+    assert_eq!(folders, ["shop/subs", "/nc"]);
+
+    for (program, code, said) in [
+        ("remap = [\"M400 py=f\"]", "machine-remap", "py=f needs Python"),
+        ("remap = [\"M6 prolog=a ngc=b\"]", "machine-remap", "prolog=a needs Python"),
+        ("remap = [\"M6 ngc=b epilog=c\"]", "machine-remap", "epilog=c needs Python"),
+        ("remap = [\"M400 python=f\"]", "machine-remap", "python=f needs Python"),
+        ("remap = [\"M3 ngc=a\"]", "machine-remap", "M3 cannot be remapped"),
+        ("remap = [\"M400 argspec=P! ngc=a\"]", "machine-remap", "argspec=P!"),
+        ("remap = [\"M400 argspec=P\"]", "machine-remap", "has no ngc="),
+        ("remap = [\"\"]", "machine-remap", "nothing is remapped"),
+        ("remap = [\"M400 ngc=a\", \"m400 ngc=b\"]", "machine-remap", "remapped already"),
+        ("remap = \"M400 ngc=a\"", "machine-wrong-type", "invalid type"),
+        ("remaps = []", "machine-unknown-key", "unknown field `remaps`"),
+        ("random_tool_changer = 1", "machine-wrong-type", "boolean"),
+    ] {
+        let finding = refusal(own(program));
+        assert_eq!(finding.code, code, "{program}");
+        assert!(finding.message.contains(said) && finding.help.is_some(), "{program}: {finding:?}");
+        assert!(finding.line > 0 && finding.column > 0, "{program}: {finding:?}");
+    }
+    // A code has one meaning.
+    let both = load("ox-glide-o", &["program.remap=[\"M450 ngc=a\"]"]);
+    assert!(refusal(both).message.contains("M450 is a code of the machine's own"));
+}
