@@ -171,7 +171,7 @@ fn a_sub_without_a_file_is_told_at_its_line_of_the_machine_file() {
     let lines = shipped::text("xyz").expect("it ships").lines().count() as u32;
     let program = Program::File(shop.write("program.ngc", "M2\n"));
     let refused = check(&program, &machine, &Options::default()).expect_err("the sub has no file");
-    assert_eq!(shop.said(&[refused.clone()]), [format!("mine.toml:{} machine-remap", lines + 5)]);
+    assert_eq!(shop.said(std::slice::from_ref(&refused)), [format!("mine.toml:{} machine-remap", lines + 5)]);
     assert!(refused.message.contains("no file corner.ngc") && refused.help.is_some(), "{refused:?}");
     // Beside the program it is found, as LinuxCNC finds it.
     shop.write("corner.ngc", "o<corner> sub\nG0 X1\no<corner> endsub\n");
