@@ -149,7 +149,7 @@ mod tests {
         let beside = |folder: &str| Path::new("lc").join(folder);
         let wanted = [beside("a"), beside("b/../c"), PathBuf::from("/d"), home.join("e"), beside("~f")];
         assert_eq!(ini.folders("A", "X", Path::new("lc")), wanted);
-        assert_eq!(ini.folders("A", "Y", Path::new("lc")), [PathBuf::new(); 0]);
+        assert!(ini.folders("A", "Y", Path::new("lc")).is_empty());
     }
 
     #[test]
