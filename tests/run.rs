@@ -112,6 +112,11 @@ fn text_is_for_people() {
         run.stdout
     );
     assert!(run.stderr.is_empty(), "{}", run.stderr); // no progress where there is no terminal
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let run = pkm(&["run", &shipped("moma-arcs.ngc"), "--machine", "moma-a", "--no-trace", "--out", out]);
+    let files = format!("  in {out}: steps.vcd, summary.json, report.html\n");
+    assert!(run.stdout.ends_with(&files), "{}", run.stdout);
 }
 
 #[test]
@@ -374,7 +379,10 @@ fn refusals_say_what_is_wrong_there() {
     let (status, message) = told("G21 F600\nG1 X0 Y-100\nM2\n", "moma-a");
     assert_eq!(status, 1, "{message}");
     assert!(message.contains("p1 comes 71.2334 mm higher"), "{message}");
+    let (_, message) = told("G20 F60\nG1 X0 Y-265\nM2\n", "moma-a");
+    assert!(message.contains("lengths are in inches here (G20)"), "{message}");
     let (_, message) = told("G21 F600\nG1 X0 Y-400\nM2\n", "moma-a");
+    assert!(!message.contains("inches"), "{message}");
     assert!(message.contains("mm lower, or choose"), "{message}");
 }
 

@@ -114,6 +114,11 @@ impl Frame {
         }
     }
 
+    /// Length of the program's unit now, mm: 1 or, after G20, 25.4.
+    pub fn unit_mm(&self) -> f64 {
+        self.unit_mm
+    }
+
     /// Where the program's moves end so far, machine coordinates.
     pub fn position(&self) -> &Vector {
         &self.position

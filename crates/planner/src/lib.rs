@@ -7,6 +7,43 @@
 //!
 //! `no_std`, no allocation, fixed queues, bounded work per tick. The end of the queue is always planned as a stop,
 //! so the machine can stop on the path at any time and a starved queue ends at rest at the end of what is known.
+//!
+//! ```
+//! use pkm_kins::{JointRange, Moma, MomaConfiguration, Pose};
+//! use pkm_planner::path::{FeedGroup, Geometry, Line};
+//! use pkm_planner::{Feed, JointLimits, Limits, Move, PathMode, Planner, Settings, State};
+//!
+//! // Two sliders with 200 mm of travel, 100 mm/s, 1000 mm/s²; the machine stands at `home`.
+//! let moma = Moma::new(&MomaConfiguration::A.into()).unwrap();
+//! let home = Pose { y: -265.0, ..Pose::ZERO };
+//! let range = JointRange { min: 0.0, max: 200.0 };
+//! let joint = JointLimits { range, max_velocity: 100.0, max_acceleration: 1000.0 };
+//! // 0.05: how near to a singularity it may come (0 singular, 1 best).
+//! let limits = Limits::<2>::new(&[joint, joint], &[], 0.05).unwrap();
+//! let settings = Settings { servo_period_s: 1e-3, substeps: 1, settle_periods: 0 };
+//! let mut planner = Planner::<_, 2, 16, 256>::new(moma, limits, settings, home).unwrap();
+//!
+//! // One line at 50 mm/s, then rest.
+//! let end = Pose { x: 20.0, y: -250.0, ..Pose::ZERO };
+//! let line = Line::new(*planner.end(), end.to_array()).unwrap();
+//! let feed = Feed { speed: 50.0, group: FeedGroup::Xyz };
+//! let geometry = Geometry::Line(line);
+//! planner.push(Move { geometry, feed, rapid: false, mode: PathMode::ExactStop, span: Default::default() }).unwrap();
+//! planner.finish();
+//!
+//! // The servo interrupt: joint positions and velocities for the step generators.
+//! let mut ticks = 0;
+//! let setpoint = loop {
+//!     let setpoint = planner.tick().unwrap();
+//!     ticks += 1;
+//!     if setpoint.state == State::Idle {
+//!         break setpoint;
+//!     }
+//! };
+//! // 25 mm at 50 mm/s, and a little to set off and to stop.
+//! assert!((500..600).contains(&ticks), "{ticks}");
+//! assert!((setpoint.pose.x - 20.0).abs() < 1e-9 && setpoint.joint_velocity[0] == 0.0);
+//! ```
 #![no_std]
 
 #[cfg(test)]

@@ -266,7 +266,13 @@ fn interpret(
                 }
                 Event::Dwell { .. } | Event::Stop => {}
             }
+            let in_inches = frame.unit_mm() > 1.0;
             for mut finding in findings {
+                // The commonest reason why a whole program is out of reach.
+                if let (Severity::Error, true, Some(help)) = (finding.severity, in_inches, &mut finding.help)
+                {
+                    help.push_str("; lengths are in inches here (G20)");
+                }
                 // In a sub: its own file, and the calls that led there.
                 finding.file = source.file_name(span.file).unwrap_or(finding.file);
                 finding.notes.extend(interpreter.call_notes(&source, &program.name()));

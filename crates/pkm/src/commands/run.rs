@@ -113,10 +113,13 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
     let result = pkm_run::run_checked(&program, &machine, &options, checked, outputs, progress, judged);
     bar.finish_and_clear();
     let (summary, files) = result?;
-    if let (Some(folder), Some(summary_file)) = (folder, summary_file) {
-        let page = report.zip(report_file);
-        save(folder, files, page, summary_file, &program, &summary)?;
-    }
+    let written = match (folder, summary_file) {
+        (Some(folder), Some(summary_file)) => {
+            let page = report.zip(report_file);
+            save(folder, files, page, summary_file, &program, &summary)?
+        }
+        _ => Vec::new(),
+    };
     if let (Some(kept), Some(parameters)) = (&kept, &summary.parameters) {
         kept.save(parameters)?;
     }
@@ -133,6 +136,9 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
             if let Some((_, sentence)) = &verdict {
                 writeln!(out, "  outcome: {sentence}")?;
             }
+            if let (Some(folder), false) = (&arguments.out, written.is_empty()) {
+                writeln!(out, "  in {}: {}", folder.display(), written.join(", "))?;
+            }
         }
     }
     Ok(if interrupted.load(Ordering::Relaxed) && !summary.completed {
@@ -145,7 +151,7 @@ fn drive(arguments: &Run, messages: &Messages) -> Result<Outcome, Failure> {
 }
 
 /// Ends all files and puts them in place; the first error of any of them is the answer.
-/// Nothing moved: then only the report is new, and says why.
+/// Nothing moved: then only the report is new, and says why. The names of the new files.
 fn save(
     folder: Folder,
     files: Option<Files>,
@@ -153,7 +159,7 @@ fn save(
     mut summary_file: Pending,
     program: &Program,
     summary: &Summary,
-) -> Result<(), Failure> {
+) -> Result<Vec<String>, Failure> {
     let mut done = Vec::new();
     let told = |name: &str, error: &std::io::Error| folder.failure(name, error);
     if let Some(files) = files {
@@ -175,7 +181,9 @@ fn save(
         report.write(summary, text, &mut file).map_err(|error| told("report.html", &error))?;
         done.push(file);
     }
-    folder.commit(done)
+    let names = done.iter().map(Pending::name).collect();
+    folder.commit(done)?;
+    Ok(names)
 }
 
 /// Lines of the program, on a terminal; nothing elsewhere.
