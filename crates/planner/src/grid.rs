@@ -6,7 +6,7 @@
 
 use crate::PlanError;
 use crate::interval::fastest_entry;
-use crate::limits::{FASTEST, Rows, Sample, Spot};
+use crate::limits::{BOW, FASTEST, Rows, Sample, Spot};
 use crate::operator::Panel;
 use crate::pair::{higher, lower};
 use crate::path::Geometry;
@@ -354,21 +354,31 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 let right = CHANGE * scales.unit;
                 // Compared as squares: the root is seldom needed.
                 let shortest_2 = brief * brief * scales.x;
-                if step * step <= shortest_2 || scales.change <= right {
-                    // What would have been right here is right for the next, or nearly so.
-                    next_guess = step * lower(4.0, 0.9 * right / scales.change);
-                    if next_guess * next_guess < 0.75 * 0.75 * shortest_2 {
-                        next_guess = 0.75 * sqrt(shortest_2);
+                let by_bow = if step * step <= shortest_2 || scales.change <= right {
+                    let bow = last.bow(sample, rows, step, &scales);
+                    if bow <= BOW {
+                        // What would have been right here is right for the next, or nearly so.
+                        next_guess = step * lower(4.0, 0.9 * right / scales.change);
+                        if next_guess * next_guess < 0.75 * 0.75 * shortest_2 {
+                            next_guess = 0.75 * sqrt(shortest_2);
+                        }
+                        if bow > 0.25 * BOW {
+                            next_guess = lower(next_guess, step);
+                        }
+                        // A short piece says little of what the path could bear; a straight one nothing.
+                        if step >= remaining || scales.change == 0.0 {
+                            next_guess = higher(next_guess, guess);
+                        }
+                        break;
                     }
-                    // A short piece says little of what the path could bear; a straight one nothing.
-                    if step >= remaining || scales.change == 0.0 {
-                        next_guess = higher(next_guess, guess);
-                    }
-                    break;
-                }
+                    Some(sqrt(0.9 * BOW / bow).max(0.1))
+                } else {
+                    None
+                };
                 // Change grows about linearly with the step; never below what is needed.
                 let by_change = step * (0.9 * right / scales.change).clamp(0.1, 1.0);
-                let shorter = even(remaining, by_change.max(0.5 * sqrt(shortest_2)).min(0.75 * step));
+                let right = by_bow.map_or(by_change.max(0.5 * sqrt(shortest_2)), |share| share * step);
+                let shorter = even(remaining, right.min(0.75 * step));
                 if !(shorter < step) || shortened == 60 {
                     break;
                 }

@@ -431,7 +431,27 @@ impl<const R: usize> Sample<R> {
         }
         Scales { change: highest(change), unit, x }
     }
+
+    /// What decides by how much a row exceeds, between two points `step` apart, what it is at them while one acceleration is kept: q″ and
+    /// x both go linearly, so their product is bowed by Δq″ Δx/4, and q′ by Δq″ Δs/8. With Δx = 2 s̈ Δs that is 5/8 of |Δq″ s̈ Δs|; s̈
+    /// is at most 1/`unit`, and Δx no more than x̂.
+    #[inline(always)]
+    pub(crate) fn bow(&self, other: &Self, rows: usize, step: f64, scales: &Scales) -> f64 {
+        let Scales { change, unit, x } = *scales;
+        let span = lower(step, x * unit);
+        // Most of the time the change alone says that it is little.
+        if change * span <= BOW * x * unit * unit {
+            return 0.0;
+        }
+        let pairs = self.rows.pairs(rows).zip(other.rows.pairs(rows));
+        let bent = pairs
+            .fold([0.0; 2], |most, ((_, a), (_, b))| with(most, with(a, b, |a, b| (b - a).abs()), higher));
+        highest(bent) * span / unit
+    }
 }
+
+/// The [`Sample::bow`] that is small enough: what [`GUARD`] leaves is more.
+pub(crate) const BOW: f64 = 6e-4;
 
 /// See [`Sample::variation`].
 #[derive(Debug, Clone, Copy)]

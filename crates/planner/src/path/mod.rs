@@ -105,13 +105,12 @@ impl Geometry {
         }
     }
 
-    /// The longest step, in s, over which it turns so little that what lies between cannot go unseen (a turn later everything looks
-    /// the same), and an arc so little that acceleration between the ends exceeds that at them by less than the guard (about φ²/4).
+    /// The longest step, in s, over which it turns so little that what lies between cannot go unseen: a turn later everything looks
+    /// the same.
     pub(crate) fn longest_step(&self) -> f64 {
-        const ARC_RAD: f64 = 0.02;
         let (rad, round) = self.turning();
-        let steps = (rad / EIGHTH_TURN).max(round / ARC_RAD);
-        if steps > 1.0 { self.length() / steps } else { f64::INFINITY }
+        let turned = rad.max(round);
+        if turned > EIGHTH_TURN { self.length() * (EIGHTH_TURN / turned) } else { f64::INFINITY }
     }
 
     /// Into how many parts it is cut to be looked at `spacing_mm` apart (of XYZ or UVW), or 0.02 rad (of ABC), or an eighth of a turn

@@ -4,6 +4,7 @@
 use crate::catalogue::{Case, blend, identity, moma, on_delta, on_moma, polyline, xyz};
 use crate::harness::{Disturbance, Rig, Sampling, TestPlanner, drive, limits, start, to_move, with_stack};
 use pkm_canon::Span;
+use pkm_kins::moma::{Moma, MomaConfiguration};
 use pkm_kins::{Axis, InverseError, JointRange, Kinematics, OxForm, OxGlide, Pose};
 use pkm_planner::path::{Arc, Geometry, Line, Vector};
 use pkm_planner::{
@@ -344,6 +345,31 @@ fn circles_of_some_micrometres_keep_the_limits() {
                 assert!(most <= 1.0, "case {case}, radius {radius} at {at:?}: {most}");
             }
         }
+    });
+}
+
+/// Out of a slow arc into a line, through a corner of micrometres in which the speed rises from next to nothing to its most.
+#[test]
+fn a_small_corner_between_a_slow_and_a_fast_move_keeps_the_limits() {
+    with_stack(|| {
+        let centre = [57.714944, 57.41926, 0.0];
+        let on_circle =
+            |angle: f64| xyz(centre[0] + 0.373 * libm::cos(angle), centre[1] + 0.373 * libm::sin(angle), 0.0);
+        let (from, to) = (on_circle(-2.6688), on_circle(-0.6594));
+        let arc = Geometry::Arc(Arc::new(from, to, centre, [0.0, 0.0, 1.0], 1).unwrap());
+        let line = Geometry::Line(Line::new(to, xyz(58.035963, 57.221886, 0.0)).unwrap());
+        let mechanism = Moma::new(&MomaConfiguration::D.into()).unwrap().into();
+        let case = Case { mechanism, ..on_moma(vec![(arc, blend(0.001)), (line, PathMode::ExactStop)]) };
+        let mut rig = Rig::new(&case, Sampling::TENTH);
+        for (step, speed) in case.moves.iter().zip([1.0, 1000.0]) {
+            let mut step = to_move(&case, *step);
+            step.feed.speed = speed;
+            rig.planner.push(step).unwrap();
+        }
+        rig.planner.finish();
+        while rig.tick().state != State::Idle {}
+        let [_, acceleration, _] = rig.worst();
+        assert!(acceleration <= 1.0, "{acceleration}");
     });
 }
 
