@@ -386,6 +386,26 @@ fn refusals_say_what_is_wrong_there() {
     assert!(message.contains("mm lower, or choose"), "{message}");
 }
 
+/// A part that lies wrong on the machine fails in every block; a person reads three of them and where the others are.
+#[test]
+fn many_findings_of_one_kind_are_folded_for_people_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.ngc");
+    let out_of_reach = |moves: usize| {
+        let blocks: String = (0..moves).map(|k| format!("G1 X{k} Y-600\n")).collect();
+        write(&path, format!("G21 F600\n{blocks}M2\n"));
+        let text = pkm(&["check", path.to_str().unwrap(), "--machine", "moma-a"]);
+        let json = pkm(&["check", path.to_str().unwrap(), "--machine", "moma-a", "--format", "json"]);
+        let findings = json.json()["diagnostics"].as_array().unwrap().len();
+        (text.stdout.clone(), text.stderr.matches("help").count(), findings, text.stderr)
+    };
+    let (summary, told, findings, text) = out_of_reach(100);
+    assert!(summary.contains("100 errors") && findings == 100, "{summary}");
+    assert!(told < 20 && text.contains(" more, in lines "), "{text}");
+    let (_, told, findings, text) = out_of_reach(6);
+    assert_eq!((told, findings), (6, 6), "{text}");
+}
+
 #[test]
 fn interrupted_canon_leaves_no_file_behind() {
     let folder = tempfile::tempdir().unwrap();

@@ -75,6 +75,10 @@ pub(crate) struct Messages {
 /// The most bytes of a source line that are shown.
 const LONGEST_LINE: usize = 512;
 
+/// The most findings of one kind in a row that are all told in full, and how many of them are if there are more.
+const MOST_ALIKE: usize = 6;
+const TOLD_ALIKE: usize = 3;
+
 impl Messages {
     /// Coloured or not, as asked and as the terminal allows.
     pub(crate) fn new(color: Color, overrides: &[String]) -> Self {
@@ -91,11 +95,23 @@ impl Messages {
         Self { renderer, styled, overrides: overrides.join("\n") }
     }
 
-    /// Prints the messages; a standard error that cannot be written to is ignored.
+    /// Prints the messages; a standard error that cannot be written to is ignored. Of many of one kind in a row the first
+    /// are told in full, of the others where they are.
     pub(crate) fn print(&self, diagnostics: &[Diagnostic]) {
         let mut err = stderr().lock();
-        for diagnostic in diagnostics {
-            let _ = writeln!(err, "{}\n", self.text(diagnostic));
+        let alike = |a: &Diagnostic, b: &Diagnostic| (&a.code, &a.file) == (&b.code, &b.file);
+        for row in diagnostics.chunk_by(alike) {
+            let full = if row.len() > MOST_ALIKE { TOLD_ALIKE } else { row.len() };
+            let (told, others) = row.split_at(full);
+            for diagnostic in told {
+                let _ = writeln!(err, "{}\n", self.text(diagnostic));
+            }
+            if let (Some(first), Some(last)) = (others.first(), others.last()) {
+                let message = format!("{} more, in lines {} to {}", others.len(), first.line, last.line);
+                let help = Some("`pkm check --format json` tells each".to_owned());
+                let folded = Diagnostic { message, help, line: 0, notes: Vec::new(), ..first.clone() };
+                let _ = writeln!(err, "{}\n", self.text(&folded));
+            }
         }
     }
 
