@@ -294,12 +294,14 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
         false
     }
 
-    /// True at rest at the front node. Where the plan says rest, what is left of the speed is rounding.
+    /// True at rest at the front node. Where the plan says rest, what is left of the speed is rounding: of every joint less than it
+    /// gains in a nanosecond.
     fn stops_here(&mut self) -> bool {
-        const REST_MM: f64 = 1e-9;
-        let single =
-            self.executor.panel.single_block && self.executor.v * self.settings.servo_period_s <= REST_MM;
-        let stops = self.nodes.front().is_some_and(|node| node.stop || single && node.blocks > 0);
+        const REST_S: f64 = 1e-9;
+        let (v, single) = (self.executor.v, self.executor.panel.single_block);
+        let rests = |node: &Node<R>| node.left.first.iter().all(|p| p.abs() * v <= REST_S);
+        let stops =
+            self.nodes.front().is_some_and(|node| node.stop || single && node.blocks > 0 && rests(node));
         if stops {
             (self.executor.x, self.executor.v) = (0.0, 0.0);
         }

@@ -1,8 +1,9 @@
 //! Single block, a queue that runs dry, and what a smoother behind the planner has to wait for.
 
-use crate::catalogue::{Case, all, flower_on_moma, on_moma, polyline, xyz};
+use crate::catalogue::{Case, all, flower_on_moma, identity, on_moma, polyline, xyz};
 use crate::harness::{Differences, Rig, Sampling, TestPlanner, limits, random, start, to_move, with_stack};
 use pkm_canon::Span;
+use pkm_kins::Axis;
 use pkm_planner::path::Vector;
 use pkm_planner::{Move, PathMode, Planner, PushError, Setpoint, Settings, Smoother, State};
 
@@ -132,6 +133,43 @@ fn single_block_at_any_tick_stops_at_the_end_of_a_block_within_the_limits() {
                 let [v, a] = [seen.velocity, seen.acceleration];
                 assert!(v <= 1.0 + 1e-6 && a <= 1.0 + 1e-6, "{id} at {at}: velocity {v}, acceleration {a}");
             }
+        }
+    });
+}
+
+/// A turn with a ten-millionth of a millimetre beside it is that long in s: at rest is what the joints are, not what s is.
+#[test]
+fn single_block_at_any_tick_of_a_turn_with_next_to_no_way_keeps_the_limits() {
+    with_stack(|| {
+        let place = |x: f64, a: f64| [x, 0.0, 0.0, a, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let points = [place(0.0, 0.0), place(1e-7, 1.0), place(2e-7, 2.0), place(0.0, 3.0)];
+        let case = Case {
+            mechanism: identity(&[Axis::X, Axis::A]),
+            velocity: vec![100.0, 1.5],
+            acceleration: vec![1000.0, 15.0],
+            moves: polyline(&points, PathMode::ExactPath),
+            feed_mm_s: f64::INFINITY,
+        };
+        let moves = blocks(&case);
+        for at in (0..2500).step_by(3) {
+            let mut planner = planner(&case, 0);
+            let mut seen = Differences::new(&case, 1e-3, planner.setpoint().joints);
+            let mut next = 0;
+            for tick in 0..6000 {
+                feed(&mut planner, &moves, &mut next);
+                if tick == at {
+                    planner.set_single_block(true);
+                }
+                let setpoint = planner.tick().unwrap();
+                seen.push(setpoint.joints);
+                match setpoint.state {
+                    State::BlockEnd => assert!(planner.step()),
+                    State::Idle if next == moves.len() => break,
+                    _ => {}
+                }
+            }
+            let [v, a] = [seen.velocity, seen.acceleration];
+            assert!(v <= 1.0 && a <= 1.0, "at {at}: velocity {v}, acceleration {a}");
         }
     });
 }
