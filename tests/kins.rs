@@ -401,6 +401,7 @@ fn refused_lines_keep_their_place() {
         &[json!({ "joints": [1, 2, 3] }), json!({ "joints": [100, 100], "seed": {} })],
     );
     assert_eq!((answers[0]["error"]["code"].as_str(), status), (Some("bad_input"), 1));
+    assert_eq!(answers[0]["error"]["message"], "joints: 3 given, the machine has 2");
     assert!(answers[1]["pose"]["y"].is_number() && answers[1]["pose"]["z"].is_null());
 }
 

@@ -91,7 +91,7 @@ impl From<Refusal> for Refused {
 
 impl From<serde_json::Error> for Refused {
     fn from(error: serde_json::Error) -> Self {
-        Self::Line(error.to_string())
+        Self::Line(format!("{error}; one JSON object a line, as `pkm kins --help` shows"))
     }
 }
 
@@ -259,7 +259,7 @@ impl Query {
     fn joints(&self, written: &[f64]) -> Result<Joints, Refused> {
         let count = self.machine.joints.len();
         if written.len() != count {
-            return Err(Refused::Line(format!("{} joints given, the machine has {count}", written.len())));
+            return Err(Refused::Line(format!("joints: {} given, the machine has {count}", written.len())));
         }
         let mut joints = [0.0; MAX_JOINTS];
         for ((joint, &value), machine) in joints.iter_mut().zip(written).zip(&self.machine.joints) {
