@@ -132,6 +132,7 @@ errors! {
     ParameterFileCut "param-file" "the file is not whole" "restore it from its .bak; without a file all parameters begin at 0";
     ParameterFileLine "param-file" "not a parameter and its value" "write a number and a value, such as 5221 12.5";
     ParameterFileOrder { index: i32, last: i32 } "param-file" "parameter {index} comes after {last}" "numbers must rise";
+    ParamElsewhere "param-elsewhere" "HAL pins and values of an INI file are not known here" "EXISTS[..] of them is 0 here; what depends on them in LinuxCNC is not checked";
     ParamNever "param-undefined" "nothing gives this parameter a value" "assign to it first, or test it with EXISTS[#<name>]";
     ParamUnset { index: i32 } "param-unset" "#{index} is read, but nothing sets it: it is 0" "set it first, or check the number";
     ParamNames { limit: u32 } "param-count" "more than {limit} named parameters" "use numbered parameters";

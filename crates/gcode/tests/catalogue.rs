@@ -16,7 +16,7 @@ const ELSEWHERE: [&str; 4] = ["param-memory", "o-memory", "file-open", "start-li
 const OUT_OF_REACH: &str = "more than {limit} parameter settings in one block";
 
 /// Identifier, and a program that raises it; `|` ends a line.
-const PROGRAMS: [(&str, &str); 180] = [
+const PROGRAMS: [(&str, &str); 181] = [
     ("file-empty", ""),
     ("file-no-end", "%|G0 X1"),
     ("file-no-end", "G0 X1"),
@@ -76,6 +76,7 @@ const PROGRAMS: [(&str, &str); 180] = [
     ("param-undefined", "G0 X#<nothing>|M2"),
     ("param-cc", "F100|G41 D1|G1 X10|#1=#5420|M2"),
     ("param-name", "#<abc=1|M2"),
+    ("param-elsewhere", "o1 if [EXISTS[#<_hal[a]>]]|G0 X#<_hal[a]>|o1 endif|M2"),
     ("param-unset", "G0 X#100|M2"),
     ("param-equal", "#1 2|M2"),
     ("expr-unclosed", "G0 X[1|M2"),

@@ -251,6 +251,14 @@ impl Import<'_> {
             Some(value) => self
                 .remark(format!("[EMCIO]RANDOM_TOOLCHANGER = {value} is neither 0 nor 1: 0 stands for it")),
         }
+        for (section, key) in NOT_CARRIED {
+            let value = ini.get(section, key).unwrap_or("0").to_ascii_lowercase();
+            if !matches!(value.as_str(), "" | "no" | "false" | "off") && value.parse() != Ok(0.0) {
+                let text =
+                    format!("[{section}]{key} = {value} is left out: a machine file has no word for it");
+                self.remark(text);
+            }
+        }
         if !lines.is_empty() {
             let _ = write!(t, "\n[program]\n{lines}");
         }
@@ -572,6 +580,25 @@ impl Import<'_> {
         }
     }
 }
+
+/// What an INI file tells the interpreter, and a machine file has no word for: `pkm canon --ini` knows it.
+const NOT_CARRIED: [(&str, &str); 15] = [
+    ("EMCIO", "TOOL_CHANGE_AT_G30"),
+    ("EMCIO", "TOOL_CHANGE_QUILL_UP"),
+    ("EMCIO", "TOOL_CHANGE_WITH_SPINDLE_ON"),
+    ("AXIS_A", "WRAPPED_ROTARY"),
+    ("AXIS_B", "WRAPPED_ROTARY"),
+    ("AXIS_C", "WRAPPED_ROTARY"),
+    ("RS274NGC", "RETAIN_G43"),
+    ("RS274NGC", "OWORD_NARGS"),
+    ("RS274NGC", "ORIENT_OFFSET"),
+    ("RS274NGC", "DISABLE_AUTO_G54"),
+    ("RS274NGC", "DISABLE_G92_PERSISTENCE"),
+    ("RS274NGC", "G64_DEFAULT_TOLERANCE"),
+    ("RS274NGC", "G64_DEFAULT_NAIVETOLERANCE"),
+    ("RS274NGC", "G73_PECK_CLEARANCE"),
+    ("RS274NGC", "G83_PECK_CLEARANCE"),
+];
 
 /// A text as TOML has it.
 fn quoted(text: &str) -> String {

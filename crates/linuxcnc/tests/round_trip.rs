@@ -178,7 +178,7 @@ fn refuses_what_it_cannot_read() {
 
 #[test]
 fn remapped_codes_and_the_tool_changer_come_along() {
-    const PROGRAM: &str = "[DISPLAY]\nPROGRAM_PREFIX = ../nc\n[EMCIO]\nRANDOM_TOOLCHANGER = 1\n[RS274NGC]\n\
+    const PROGRAM: &str = "[DISPLAY]\nPROGRAM_PREFIX = ../nc\n[EMCIO]\nRANDOM_TOOLCHANGER = 1\nTOOL_CHANGE_AT_G30 = 1\nTOOL_CHANGE_QUILL_UP = 0\n[RS274NGC]\n\
         SUBROUTINE_PATH = ./subs:/shared\nREMAP =  M400  modalgroup=10 argspec=Pq ngc=corner # remark\nREMAP=M6 prolog=a ngc=b epilog=c\n\
         REMAP = G88.1 modalgroup=1 py=involute\nREMAP = M400 ngc=again\n";
     let none = |_: &str| None;
@@ -186,10 +186,15 @@ fn remapped_codes_and_the_tool_changer_come_along() {
     assert!(!bare.toml.contains("[program]"), "{}", bare.toml);
     let imported = import(&format!("{PROGRAM}{FOREIGN}"), Path::new("lc"), &none).unwrap();
     let new: Vec<_> = imported.remarks.iter().filter(|remark| !bare.remarks.contains(remark)).collect();
-    for (remark, said) in new.iter().zip(["prolog=a needs Python", "py=involute needs Python", "already"]) {
+    for (remark, said) in new.iter().zip([
+        "prolog=a needs Python",
+        "py=involute needs Python",
+        "already",
+        "[EMCIO]TOOL_CHANGE_AT_G30",
+    ]) {
         assert!(remark.contains("is left out") && remark.contains(said), "{remark}");
     }
-    assert_eq!(new.len(), 3, "{new:?}");
+    assert_eq!(new.len(), 4, "{new:?}");
 
     let program = |name: &str, toml: &str| {
         let machine =

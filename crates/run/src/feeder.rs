@@ -12,8 +12,8 @@ use crate::switch::{FormSwitchDrive, switched};
 use crate::synchronised::{MOST_MOVES, SynchronisedDrive};
 use crate::{Options, messages};
 use pkm_canon::diagnostic::Diagnostic;
-use pkm_canon::{Probe, Span};
-use pkm_gcode::{FileSource, Interpreter, Parameters, Status};
+use pkm_canon::{FileId, Probe, Span};
+use pkm_gcode::{FileSource, Interpreter, LineSource, Parameters, Status};
 use pkm_hal_sim::{Feedback, Operator, Orient, Setpoint, SetpointSource, Simulation, SpindleCommand};
 use pkm_kins::machine::Mechanism;
 use pkm_kins::{Joints, Kinematics, Pose};
@@ -249,6 +249,11 @@ impl<'a> Feeder<'a> {
         let elsewhere = self.form_switch.as_ref().map(|switch| switch.span);
         let elsewhere = elsewhere.or(self.in_step.as_ref().map(|drive| drive.span));
         elsewhere.unwrap_or(self.planner.setpoint().span).line
+    }
+
+    /// The path of a subroutine file.
+    pub(crate) fn file_name(&self, file: FileId) -> String {
+        self.source.file_name(file).unwrap_or_default()
     }
 
     /// The setpoint given last.

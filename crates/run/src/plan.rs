@@ -11,6 +11,7 @@ use crate::probing::Shadow;
 use crate::program::Program;
 use crate::{Options, messages};
 use pkm_canon::diagnostic::{Diagnostic, Severity};
+use pkm_canon::{FileId, Span};
 use pkm_hal_sim::SetpointSource;
 use pkm_kins::Kinematics;
 use pkm_machine::Machine;
@@ -25,6 +26,9 @@ pub type Shares = BTreeMap<String, f64>;
 /// One block.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BlockPlan {
+    /// The subroutine file it stands in; `None` in the program itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
     /// Its line.
     pub line: u32,
     /// Time spent on it, blends after it included.
@@ -33,6 +37,16 @@ pub struct BlockPlan {
     pub limited_by_s: Shares,
     /// Seconds of it lost against the programmed feed.
     pub lost_s: f64,
+}
+
+impl BlockPlan {
+    /// `line 7`, or `hop.ngc:3` in a subroutine file.
+    pub fn place(&self) -> String {
+        match &self.file {
+            None => format!("line {}", self.line),
+            Some(file) => format!("{file}:{}", self.line),
+        }
+    }
 }
 
 /// What a program uses of one joint; mm or degrees.
@@ -145,7 +159,9 @@ fn seconds(machine: &Machine, periods: f64) -> f64 {
 
 /// A program driven without the HAL.
 struct Driven {
-    blocks: BTreeMap<u32, Book>,
+    blocks: BTreeMap<(FileId, u32), Book>,
+    /// Subroutine files by number.
+    files: BTreeMap<FileId, String>,
     duration_s: f64,
     starved_stops: u64,
     joints: Vec<JointUse>,
@@ -177,9 +193,10 @@ fn fill(
     plan.completed = driven.failure.is_none();
     (plan.duration_s, plan.starved_stops) = (driven.duration_s, driven.starved_stops);
     (plan.joints, plan.min_singularity_distance) = (driven.joints.clone(), driven.min_singularity_distance);
-    let mut longest_loss = (0.0, 0);
-    for (&line, book) in &driven.blocks {
-        let mut block = BlockPlan { line, duration_s: 0.0, limited_by_s: Shares::new(), lost_s: 0.0 };
+    let mut longest_loss = (0.0, String::new());
+    for ((file, line), book) in &driven.blocks {
+        let (file, line) = (driven.files.get(file).cloned(), *line);
+        let mut block = BlockPlan { file, line, duration_s: 0.0, limited_by_s: Shares::new(), lost_s: 0.0 };
         for (limit, periods) in &book.spent {
             block.duration_s += periods;
             *block.limited_by_s.entry(limit.words(machine)).or_default() += periods;
@@ -194,7 +211,7 @@ fn fill(
             *sum = seconds(machine, *sum);
         }
         if block.lost_s > longest_loss.0 {
-            longest_loss = (block.lost_s, line);
+            longest_loss = (block.lost_s, block.place());
         }
         plan.blocks.push(block);
     }
@@ -213,7 +230,8 @@ fn drive(program: &Program, machine: &Machine, options: &Options) -> Result<Driv
     let period_s = machine.servo_period_ns as f64 / 1e9;
     let start = feeder.setpoint().joints;
     let mut before = [start; 2];
-    let mut blocks: BTreeMap<u32, Book> = BTreeMap::new();
+    let mut blocks: BTreeMap<(FileId, u32), Book> = BTreeMap::new();
+    let mut files = BTreeMap::new();
     let (mut ticks, mut first, mut last) = (0_u64, None, 0);
     let (mut lowest, mut highest, mut nearest) = (start, start, f64::INFINITY);
     let mut failure = None;
@@ -238,7 +256,11 @@ fn drive(program: &Program, machine: &Machine, options: &Options) -> Result<Driv
                 true => Limited::Spindle,
                 false => limited(machine, &setpoint, &before, period_s).0,
             };
-            let book = blocks.entry(setpoint.span.line).or_default();
+            let Span { file, line, .. } = setpoint.span;
+            if file != FileId(0) {
+                files.entry(file).or_insert_with(|| feeder.file_name(file));
+            }
+            let book = blocks.entry((file, line)).or_default();
             *book.spent.entry(limit).or_default() += 1.0;
             // 0 on rapids
             let lost = 1.0 - setpoint.feed_use / options.feed_override;
@@ -266,6 +288,7 @@ fn drive(program: &Program, machine: &Machine, options: &Options) -> Result<Driv
         .collect();
     Ok(Driven {
         blocks,
+        files,
         duration_s: seconds(machine, (last - first.unwrap_or(last)) as f64),
         starved_stops: feeder.starved_stops(),
         joints,
@@ -324,7 +347,7 @@ fn verdict(
 }
 
 /// Where the program falls short of its feed: three limits and the worst block.
-fn loss(machine: &Machine, driven: &Driven, (block_s, line): (f64, u32)) -> String {
+fn loss(machine: &Machine, driven: &Driven, (block_s, place): (f64, String)) -> String {
     let causes = driven.causes(|book| &book.lost).into_iter();
     let mut causes: Vec<(Limited, f64)> = causes
         .map(|(limit, periods)| (limit, seconds(machine, periods)))
@@ -345,7 +368,7 @@ fn loss(machine: &Machine, driven: &Driven, (block_s, line): (f64, u32)) -> Stri
         })
         .collect();
     format!(
-        "{lost_s:.3} s are lost against the programmed feed: {}; most in line {line} ({block_s:.3} s)",
+        "{lost_s:.3} s are lost against the programmed feed: {}; most in {place} ({block_s:.3} s)",
         named.join(", ")
     )
 }

@@ -120,6 +120,14 @@ fn a_remapped_code_moves_as_what_its_sub_says() {
                 plan(program, machine, &Options::default()).expect("readable").duration_s
             };
             assert_eq!(duration(&program, &machine), duration(&piped(long), &plain));
+            let planned = plan(&program, &machine, &Options::default()).expect("readable");
+            let places: Vec<String> = planned.blocks.iter().map(|block| block.place()).collect();
+            let sub = |name: &str, line: u32| format!("{}:{line}", shop.0.join("subs").join(name).display());
+            assert_eq!(places[..2], ["line 5", "line 6"], "{places:?}");
+            assert!(
+                places.contains(&sub("corner.ngc", 2)) && places.contains(&sub("hop.ngc", 3)),
+                "{places:?}"
+            );
         }
     });
 }
@@ -149,6 +157,8 @@ fn errors_point_into_the_sub_and_at_the_remapped_block() {
     // What no run comes to is read too, and knows the codes and the names of their words.
     assert_eq!(said("o1 if [0]\nG88.1 X1 Y2\nM400 P3\no1 endif\nM2\n"), [""; 0]);
     shop.sub("hop", "o7 while [1]\nG0 X#<x>\nG0 Y#<z>\no7 endwhile");
+    shop.sub("hop_by", "o1 if [EXISTS[#<_hal[motion.x]>]]\nG1 Z#<_hal[motion.x]>\no1 endif");
+    assert_eq!(said("M401 P1\nM2\n"), ["subs/hop_by.ngc:3 param-elsewhere"]);
     assert_eq!(
         said("o1 if [0]\nG88.1 X1 Y2\no1 endif\nM2\n"),
         ["subs/hop.ngc:2 endless-loop", "subs/hop.ngc:4 param-undefined"]

@@ -95,6 +95,11 @@ pub(super) struct Reads {
     any_number_set: bool,
 }
 
+/// What only LinuxCNC knows: `#<_hal[..]>`, `#<_ini[..]>`.
+fn is_elsewhere(name: &[u8]) -> bool {
+    name.starts_with(b"_ini[") || name.starts_with(b"_hal[")
+}
+
 /// Whose name it is: global names are the main program's.
 fn owner(scope: &[u8], name: &[u8]) -> (Name, Name) {
     let scope = if name.starts_with(b"_") { &[][..] } else { scope };
@@ -215,9 +220,11 @@ impl StaticCheck<'_> {
             let known = reads.names_set.contains(key)
                 || reads.asked.contains(key)
                 || name == b"n_args"
-                || name.starts_with(b"_ini[")
-                || name.starts_with(b"_hal[")
+                || is_elsewhere(name)
                 || crate::interpreter::is_predefined(name);
+            if is_elsewhere(name) {
+                self.add_line(ErrorKind::ParamElsewhere, *span, Severity::Warning, line);
+            }
             if !known {
                 self.add_line(ErrorKind::ParamNever, *span, severity, line);
             }

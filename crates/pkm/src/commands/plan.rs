@@ -58,7 +58,11 @@ fn plan(arguments: &Plan, messages: &Messages) -> Result<Outcome, Failure> {
                     .filter(|(_, seconds)| *seconds >= 0.005 * block.duration_s)
                     .map(|(limit, seconds)| format!("{limit} {:.0} %", 100.0 * seconds / block.duration_s))
                     .collect();
-                writeln!(out, "  line {:6}  {:9.3} s  {}", block.line, block.duration_s, limits.join(", "))?;
+                let place = match block.file {
+                    None => format!("line {:6}", block.line),
+                    Some(_) => block.place(),
+                };
+                writeln!(out, "  {place}  {:9.3} s  {}", block.duration_s, limits.join(", "))?;
             }
         }
     }
