@@ -406,6 +406,15 @@ fn many_findings_of_one_kind_are_folded_for_people_only() {
     assert_eq!((told, findings), (6, 6), "{text}");
 }
 
+/// Sends Ctrl-C and waits for the clean end.
+fn interrupted(child: std::process::Child) -> std::process::Output {
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    output
+}
+
 #[test]
 fn interrupted_canon_leaves_no_file_behind() {
     let folder = tempfile::tempdir().unwrap();
@@ -423,10 +432,7 @@ fn interrupted_canon_leaves_no_file_behind() {
         assert!(child.try_wait().unwrap().is_none(), "it ended before it was interrupted");
         std::thread::yield_now();
     }
-    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(kill.success());
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130));
+    let output = interrupted(child);
     assert!(String::from_utf8(output.stderr).unwrap().contains("interrupted"));
     assert!(listing(&out).is_empty(), "{:?}", listing(&out));
 }
@@ -464,10 +470,7 @@ fn an_interrupted_run_says_how_far_it_came() {
         assert!(child.try_wait().unwrap().is_none(), "it ended before it was interrupted");
         std::thread::yield_now();
     }
-    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-    assert!(kill.success());
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130));
+    let output = interrupted(child);
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(summary["completed"], false);
     let finding = &summary["diagnostics"][0];
