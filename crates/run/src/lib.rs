@@ -250,6 +250,9 @@ fn drive<O: Observer>(
     }
     let Controller { simulation, feeder, .. } = &mut controller;
     findings.append(&mut feeder.chains.warnings);
+    if let Some(excess) = &account.excess {
+        findings.push(messages::excess(program, machine, excess));
+    }
     let mut summary = account.finish(program, machine, simulation, feeder);
     summary.completed = completed && !findings.iter().any(|d| d.severity == Severity::Error);
     summary.diagnostics = findings;

@@ -1,10 +1,11 @@
 //! From errors of the rooms below to one sentence for a person: what, where, value, limit, what to do.
 
 use crate::program::Program;
+use crate::summary::Excess;
 use pkm_canon::Span;
 use pkm_canon::diagnostic::{Diagnostic, Severity};
 use pkm_hal_sim::{Fault, HalError, HomingError, PinFault};
-use pkm_kins::{InverseError, JointLimit, Kinematics, Pose, Side, Singularity, maths};
+use pkm_kins::{InverseError, JointKind, JointLimit, Kinematics, Pose, Side, Singularity, maths};
 use pkm_machine::{Machine, Refusal, SwitchTarget};
 use pkm_planner::{PlanError, PlanErrorKind, SpindleOrder, Stage, SynchronisedMove};
 use std::io;
@@ -184,6 +185,28 @@ pub(crate) fn no_such_pin(program: &Program, fault: &PinFault, error: &HalError)
         message,
         "`pkm hal show --machine FILE pin` lists the pins; a fault needs one with direction IN",
     )
+}
+
+/// A joint that was driven over a limit.
+pub(crate) fn excess(program: &Program, machine: &Machine, excess: &Excess) -> Diagnostic {
+    let span = Span { line: excess.line, ..Span::default() };
+    let joint = &machine.joints[excess.joint];
+    let message = format!(
+        "{} was driven at {:.6} times its limit of {}, {} {}",
+        joint.name,
+        excess.value / excess.limit,
+        excess.quantity,
+        joint.to_face(excess.limit),
+        match (joint.kind, excess.quantity) {
+            (JointKind::Linear, "velocity") => "mm/s",
+            (JointKind::Linear, _) => "mm/s²",
+            (JointKind::Rotary, "velocity") => "°/s",
+            (JointKind::Rotary, _) => "°/s²",
+        },
+    );
+    let help =
+        "this is a fault of the planner, not of the program: please report it with program and machine file";
+    at(program, span, "limit-exceeded", Severity::Error, message, help)
 }
 
 /// A refusal of the simulated HAL.

@@ -165,6 +165,15 @@ impl Summary {
 const REACH_EVERY: u64 = 256;
 
 /// Gathers the summary tick by tick.
+/// A joint over its limit of velocity or acceleration, in its own units.
+pub(crate) struct Excess {
+    pub(crate) line: u32,
+    pub(crate) joint: usize,
+    pub(crate) quantity: &'static str,
+    pub(crate) value: f64,
+    pub(crate) limit: f64,
+}
+
 pub(crate) struct Account<'a> {
     machine: &'a Machine,
     period_s: f64,
@@ -176,6 +185,8 @@ pub(crate) struct Account<'a> {
     max: Joints,
     velocity: Joints,
     acceleration: Joints,
+    /// The first joint over a limit.
+    pub(crate) excess: Option<Excess>,
     deviation_mm: f64,
     reach_mm: f64,
     singularity: f64,
@@ -201,6 +212,7 @@ impl<'a> Account<'a> {
             max: start,
             velocity: [0.0; MAX_JOINTS],
             acceleration: [0.0; MAX_JOINTS],
+            excess: None,
             deviation_mm: 0.0,
             reach_mm: 0.0,
             singularity: f64::INFINITY,
@@ -231,8 +243,15 @@ impl<'a> Account<'a> {
             self.max[j] = self.max[j].max(q);
             let velocity = (q - last[j]) / self.period_s;
             let acceleration = (q - 2.0 * last[j] + before[j]) / (self.period_s * self.period_s);
-            self.velocity[j] = self.velocity[j].max(velocity.abs());
-            self.acceleration[j] = self.acceleration[j].max(acceleration.abs());
+            // Only a new peak can be the first above a limit.
+            if velocity.abs() > self.velocity[j] {
+                self.velocity[j] = velocity.abs();
+                self.judge(j, "velocity", setpoint.span.line);
+            }
+            if acceleration.abs() > self.acceleration[j] {
+                self.acceleration[j] = acceleration.abs();
+                self.judge(j, "acceleration", setpoint.span.line);
+            }
         }
         self.last = [last, setpoint.joints];
         if moved {
@@ -265,6 +284,20 @@ impl<'a> Account<'a> {
             let pose = executed.to_array();
             let farthest = feeder.programmed.beyond(self.deviation_mm, feeder.setpoint(), &pose);
             self.deviation_mm = farthest.unwrap_or(self.deviation_mm);
+        }
+    }
+
+    /// The planner promises that this never happens; a run looks all the same.
+    fn judge(&mut self, joint: usize, quantity: &'static str, line: u32) {
+        let limits = &self.machine.joints[joint];
+        // What differences of positions carry of rounding.
+        let rounding = 8.0 * f64::EPSILON * self.max[joint].abs().max(self.min[joint].abs()) / self.period_s;
+        let (value, limit, rounding) = match quantity {
+            "velocity" => (self.velocity[joint], limits.max_velocity, rounding),
+            _ => (self.acceleration[joint], limits.max_acceleration, rounding / self.period_s),
+        };
+        if self.excess.is_none() && value > limit * (1.0 + 1e-6) + rounding {
+            self.excess = Some(Excess { line, joint, quantity, value, limit });
         }
     }
 
@@ -365,4 +398,40 @@ fn half_step_reach_mm(machine: &Machine, mechanism: &Mechanism, pose: &Pose, joi
         }
     }
     farthest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::controller::Controller;
+    use crate::{Options, messages, on_a_large_stack};
+    use pkm_hal_sim::Observer;
+
+    #[test]
+    fn a_joint_that_is_driven_over_a_limit_is_named() {
+        on_a_large_stack(|| {
+            let text = b"G21 G90 G64 P0.01\nG0 X20 Y-260\nG1 X-20 F2000\nM2\n".to_vec();
+            let program = Program::Memory { name: "driven.ngc".to_owned(), text };
+            let machine = Machine::load("moma-a", &[]).unwrap();
+            // Driven with the machine's limits, judged with others.
+            let judge = |change: fn(&mut Machine)| {
+                let mut judging = machine.clone();
+                change(&mut judging);
+                let mut controller =
+                    Controller::new(&program, &machine, &Options::default(), (false, false)).unwrap();
+                let mut account = Account::new(&judging, &controller.simulation);
+                while !controller.is_done() {
+                    controller.period(&mut [] as &mut [&mut dyn Observer]).unwrap();
+                    account.tick(&controller.simulation, &mut controller.feeder);
+                }
+                account.excess.map(|excess| messages::excess(&program, &judging, &excess).message)
+            };
+            assert_eq!(judge(|_| ()), None);
+            let slower = judge(|machine| machine.joints[1].max_velocity = 90.0).unwrap();
+            assert!(slower.starts_with("p2 was driven at 1.0"), "{slower}");
+            assert!(slower.ends_with(" its limit of velocity, 90 mm/s"), "{slower}");
+            let softer = judge(|machine| machine.joints[0].max_acceleration = 999.0).unwrap();
+            assert!(softer.starts_with("p1 was driven at 1.0004"), "{softer}");
+        });
+    }
 }
