@@ -193,31 +193,37 @@ fn fill(
     plan.completed = driven.failure.is_none();
     (plan.duration_s, plan.starved_stops) = (driven.duration_s, driven.starved_stops);
     (plan.joints, plan.min_singularity_distance) = (driven.joints.clone(), driven.min_singularity_distance);
+    let in_seconds = |periods: BTreeMap<String, f64>| -> Shares {
+        periods.into_iter().map(|(limit, periods)| (limit, seconds(machine, periods))).collect()
+    };
+    // Not `sum`, which makes -0 of nothing.
+    let total =
+        |book: &BTreeMap<Limited, f64>| seconds(machine, book.values().fold(0.0, |all, one| all + one));
+    // Servo periods of the whole program, by limit.
+    let (mut spent, mut lost) = (BTreeMap::new(), BTreeMap::new());
     let mut longest_loss = (0.0, String::new());
     for ((file, line), book) in &driven.blocks {
-        let (file, line) = (driven.files.get(file).cloned(), *line);
-        let mut block = BlockPlan { file, line, duration_s: 0.0, limited_by_s: Shares::new(), lost_s: 0.0 };
+        let mut here = BTreeMap::new();
         for (limit, periods) in &book.spent {
-            block.duration_s += periods;
-            *block.limited_by_s.entry(limit.words(machine)).or_default() += periods;
-            *plan.limited_by_s.entry(limit.words(machine)).or_default() += periods;
+            *here.entry(limit.words(machine)).or_default() += periods;
+            *spent.entry(limit.words(machine)).or_default() += periods;
         }
         for (limit, periods) in &book.lost {
-            block.lost_s += periods;
-            *plan.lost_s.entry(limit.words(machine)).or_default() += periods;
+            *lost.entry(limit.words(machine)).or_default() += periods;
         }
-        let sums = [&mut block.duration_s, &mut block.lost_s];
-        for sum in sums.into_iter().chain(block.limited_by_s.values_mut()) {
-            *sum = seconds(machine, *sum);
-        }
+        let block = BlockPlan {
+            file: driven.files.get(file).cloned(),
+            line: *line,
+            duration_s: total(&book.spent),
+            limited_by_s: in_seconds(here),
+            lost_s: total(&book.lost),
+        };
         if block.lost_s > longest_loss.0 {
             longest_loss = (block.lost_s, block.place());
         }
         plan.blocks.push(block);
     }
-    for sum in plan.limited_by_s.values_mut().chain(plan.lost_s.values_mut()) {
-        *sum = seconds(machine, *sum);
-    }
+    (plan.limited_by_s, plan.lost_s) = (in_seconds(spent), in_seconds(lost));
     plan.verdict = verdict(program, machine, options, tries, &driven)?;
     plan.loss = loss(machine, &driven, longest_loss);
     Ok(())
