@@ -453,8 +453,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
             self.setpoint.joint_velocity = Default::default();
             return Ok(());
         };
-        let index = node.piece.wrapping_sub(self.first_piece) as usize;
-        let Some(piece) = self.pieces.get(index) else { return Ok(()) };
+        let Some(piece) = self.pieces.get(self.index_of(node.piece)) else { return Ok(()) };
         let Executor { sigma, v: speed, place, motion, .. } = &mut self.executor;
         let s = node.s + *sigma;
         piece.geometry.look(s, place);

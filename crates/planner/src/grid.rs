@@ -262,8 +262,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     }
 
     fn first_node(&mut self) -> Result<(), PlanError> {
-        let index = self.grid.piece.wrapping_sub(self.first_piece) as usize;
-        let Some(piece) = self.pieces.get(index) else { return Ok(()) };
+        let Some(piece) = self.pieces.get(self.index_of(self.grid.piece)) else { return Ok(()) };
         let (number, longest) = (self.grid.piece, piece.geometry.longest_step());
         let (sample, _, spot) = self.grid.look.samples();
         spot.look(piece, piece.from);
@@ -297,8 +296,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     /// The end of a piece: what begins here joins the last node. False if nothing follows yet.
     fn next_piece(&mut self) -> Result<bool, PlanError> {
         let number = self.grid.piece + 1;
-        let index = number.wrapping_sub(self.first_piece) as usize;
-        let Some(next) = self.pieces.get(index) else { return Ok(false) };
+        let Some(next) = self.pieces.get(self.index_of(number)) else { return Ok(false) };
         let (stop, span) = self.piece(self.grid.piece).map_or((false, None), |p| (p.stop, Some(p.span)));
         let (from, rapid, dwell_ns) = (next.from, next.rapid, next.dwell_ns);
         let longest = next.geometry.longest_step();
@@ -332,8 +330,7 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     #[inline(never)]
     fn march(&mut self, room: usize) -> Result<usize, PlanError> {
         let number = self.grid.piece;
-        let index = number.wrapping_sub(self.first_piece) as usize;
-        let Some(piece) = self.pieces.get(index) else { return Ok(room) };
+        let Some(piece) = self.pieces.get(self.index_of(number)) else { return Ok(room) };
         let rows = self.limits.rows();
         let brief = self.settings.servo_period_s / NODES_PER_PERIOD;
         let per_period = 1.0 / self.settings.servo_period_s;
@@ -354,31 +351,32 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
                 let right = CHANGE * scales.unit;
                 // Compared as squares: the root is seldom needed.
                 let shortest_2 = brief * brief * scales.x;
-                let by_bow = if step * step <= shortest_2 || scales.change <= right {
-                    let bow = last.bow(sample, rows, step, &scales);
-                    if bow <= BOW {
-                        // What would have been right here is right for the next, or nearly so.
-                        next_guess = step * lower(4.0, 0.9 * right / scales.change);
-                        if next_guess * next_guess < 0.75 * 0.75 * shortest_2 {
-                            next_guess = 0.75 * sqrt(shortest_2);
-                        }
-                        if bow > 0.25 * BOW {
-                            next_guess = lower(next_guess, step);
-                        }
-                        // A short piece says little of what the path could bear; a straight one nothing.
-                        if step >= remaining || scales.change == 0.0 {
-                            next_guess = higher(next_guess, guess);
-                        }
-                        break;
+                let steady = step * step <= shortest_2 || scales.change <= right;
+                let bow = if steady { last.bow(sample, rows, step, &scales) } else { 0.0 };
+                if steady && bow <= BOW {
+                    // What would have been right here is right for the next, or nearly so.
+                    next_guess = step * lower(4.0, 0.9 * right / scales.change);
+                    if next_guess * next_guess < 0.75 * 0.75 * shortest_2 {
+                        next_guess = 0.75 * sqrt(shortest_2);
                     }
-                    Some(sqrt(0.9 * BOW / bow).max(0.1))
+                    if bow > 0.25 * BOW {
+                        next_guess = lower(next_guess, step);
+                    }
+                    // A short piece says little of what the path could bear; a straight one nothing.
+                    if step >= remaining || scales.change == 0.0 {
+                        next_guess = higher(next_guess, guess);
+                    }
+                    break;
+                }
+                let bearable = if steady {
+                    // The bow grows with the square of the step.
+                    step * sqrt(0.9 * BOW / bow).max(0.1)
                 } else {
-                    None
+                    // Change grows about linearly with it; never below what is needed.
+                    let by_change = step * (0.9 * right / scales.change).clamp(0.1, 1.0);
+                    by_change.max(0.5 * sqrt(shortest_2))
                 };
-                // Change grows about linearly with the step; never below what is needed.
-                let by_change = step * (0.9 * right / scales.change).clamp(0.1, 1.0);
-                let right = by_bow.map_or(by_change.max(0.5 * sqrt(shortest_2)), |share| share * step);
-                let shorter = even(remaining, right.min(0.75 * step));
+                let shorter = even(remaining, bearable.min(0.75 * step));
                 if !(shorter < step) || shortened == 60 {
                     break;
                 }

@@ -444,8 +444,12 @@ impl<K: Kinematics, const R: usize, const PIECES: usize, const NODES: usize> Pla
     }
 
     pub(crate) fn piece(&self, number: u64) -> Option<&Piece> {
-        let index = number.checked_sub(self.first_piece)?;
-        self.pieces.get(usize::try_from(index).ok()?)
+        self.pieces.get(self.index_of(number))
+    }
+
+    /// Where a piece stands in `pieces`, if it does. (For those who write to other fields while they hold it.)
+    pub(crate) fn index_of(&self, number: u64) -> usize {
+        number.wrapping_sub(self.first_piece) as usize
     }
 
     /// True when nothing moves.

@@ -42,13 +42,17 @@ impl<const R: usize> Limits<R> {
         let mut last = [start.unwrap_or([0.0; R]); 2];
         let mut middle = Pose::ZERO;
         let mut place = Place::ZERO;
-        geometry.look(0.0, &mut place);
-        for k in u32::from(start.is_some())..=places {
+        let first = u32::from(start.is_some());
+        for k in first..=places {
             let s = if k == places { length } else { length * f64::from(k) / f64::from(places) };
-            geometry.look_on(s, &mut place);
-            let Place { pose, first, second } = &place;
+            if k == first {
+                geometry.look(s, &mut place);
+            } else {
+                geometry.look_on(s, &mut place);
+            }
+            let Place { pose, first: velocity, second: acceleration } = &place;
             // Not the place alone: an axis may be locked, a form switch too near to be passed.
-            let looked = kinematics.passage(pose, first, second).map_err(PlanErrorKind::Unreachable);
+            let looked = kinematics.passage(pose, velocity, acceleration).map_err(PlanErrorKind::Unreachable);
             let found = looked.and_then(|joints| {
                 let rows = self.row_values(pose, &joints);
                 self.check_rows(&rows)?;
