@@ -20,7 +20,9 @@
 
 use crate::attitude::Attitude;
 use crate::errors::{self, ForwardError, GeometryError, InverseError, Key};
-use crate::kinematics::{Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity};
+use crate::kinematics::{
+    Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity, motion_of,
+};
 use crate::maths::{PI, TAU, cos, fabs, floor, sin, sqrt, sqrt_2};
 use crate::pair;
 use crate::pose::{Axis, AxisSet, Pose};
@@ -408,9 +410,7 @@ impl Kinematics for Hexapod {
     }
 
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
-        let mut motion = JointMotion::default();
-        self.motion_into(pose, velocity, acceleration, &mut motion)?;
-        Ok(motion)
+        motion_of(self, pose, velocity, acceleration)
     }
 
     /// L L̇ = d·ḋ, L L̈ + L̇² = ḋ² + d·d̈, with d̈ = p̈ + (`[α]× + [ω]×²`) R a. Two struts at a time, the lengths with the operations of

@@ -161,6 +161,19 @@ impl<T: Copy + Default + PartialEq> Default for Branches<T> {
     }
 }
 
+/// [`Kinematics::motion`] of a mechanism with a [`Kinematics::motion_into`] of its own.
+#[inline]
+pub(crate) fn motion_of(
+    mechanism: &impl Kinematics,
+    pose: &Pose,
+    velocity: &Pose,
+    acceleration: &Pose,
+) -> Result<JointMotion, InverseError> {
+    let mut motion = JointMotion::default();
+    mechanism.motion_into(pose, velocity, acceleration, &mut motion)?;
+    Ok(motion)
+}
+
 /// What every mechanism can do. Implementations never panic, allocate, loop without bound or return NaN.
 pub trait Kinematics {
     /// Number of joints, at most [`MAX_JOINTS`].
@@ -236,8 +249,8 @@ pub trait Kinematics {
     /// As [`Self::jacobian`].
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError>;
 
-    /// [`Self::motion`] straight into the machine's own places of `motion`: the others keep their value, and after an error
-    /// nothing of it counts. What the planner calls at every node.
+    /// [`Self::motion`] straight into `motion`, of which only the machine's own places count then, and after an error nothing. What
+    /// the planner calls at every node.
     ///
     /// # Errors
     /// As [`Self::motion`].

@@ -19,7 +19,7 @@
 
 use crate::errors::{self, ForwardError, GeometryError, InverseError, Key, NoIntersection};
 use crate::kinematics::{
-    Branches, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity,
+    Branches, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity, motion_of,
 };
 use crate::maths::{fabs, sqrt, sqrt_2};
 use crate::pose::{Axis, AxisSet, Pose};
@@ -246,9 +246,7 @@ impl Kinematics for LinearDelta {
     }
 
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
-        let mut motion = JointMotion::default();
-        self.motion_into(pose, velocity, acceleration, &mut motion)?;
-        Ok(motion)
+        motion_of(self, pose, velocity, acceleration)
     }
 
     /// h ḣ = −w·ẇ, h ḧ + ḣ² = −(ẇ² + w·ẅ).

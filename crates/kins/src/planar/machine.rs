@@ -3,7 +3,7 @@
 use super::Planar;
 use crate::errors::{ForwardError, InverseError};
 use crate::kinematics::{
-    Branches, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity,
+    Branches, Jacobian, JointKind, JointMotion, Joints, Kinematics, MAX_JOINTS, Singularity, motion_of,
 };
 use crate::pose::{Axis, AxisSet, Pose};
 
@@ -67,9 +67,7 @@ impl Kinematics for Planar {
 
     #[inline]
     fn motion(&self, pose: &Pose, velocity: &Pose, acceleration: &Pose) -> Result<JointMotion, InverseError> {
-        let mut motion = JointMotion::default();
-        self.motion_into(pose, velocity, acceleration, &mut motion)?;
-        Ok(motion)
+        motion_of(self, pose, velocity, acceleration)
     }
 
     #[inline]
